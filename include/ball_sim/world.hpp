@@ -1,0 +1,157 @@
+// The world: balls, their surroundings and the method that moves them, behind one checked door.
+//
+// Everything a user can ask of a running simulation goes through here. What cannot be done is
+// refused with a reason a person can act on, and then nothing has changed. Methods below rely on
+// these checks and do none of their own.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "ball_sim/method.hpp"
+#include "ball_sim/methods.hpp"
+#include "ball_sim/scene.hpp"
+
+namespace ball_sim {
+
+/// Why something was refused. The numbers are part of the ROS interface: append only.
+enum class RefusalCode : std::uint8_t {
+  none = 0,
+  not_finite = 1,    ///< NaN or infinity where a number is needed
+  out_of_range = 2,  ///< finite, but not allowed (zero radius, ...)
+  outside = 3,       ///< beyond a wall
+  overlap = 4,       ///< into another ball
+  ball_limit = 5,    ///< more balls than max_balls
+  unknown_ball = 6,  ///< no ball with that id
+  fixed_ball = 7,    ///< a ball of infinite mass cannot be moved
+  not_planar = 8,    ///< out of the plane of a planar scene
+  rejected_with_others = 9,  ///< fine by itself, but another of the same request was refused
+};
+
+struct Refusal {
+  RefusalCode code = RefusalCode::none;  ///< none: accepted
+  std::string reason;                    ///< names the thing, the value and the rule
+
+  explicit operator bool() const { return code != RefusalCode::none; }
+};
+
+/// A request on the world that was refused; the world is as it was.
+class Refused : public std::runtime_error {
+ public:
+  explicit Refused(const Refusal& refusal)
+      : std::runtime_error(refusal.reason), code_(refusal.code) {}
+  RefusalCode code() const { return code_; }
+
+ private:
+  RefusalCode code_;
+};
+
+/// What became of a request to add balls: all of them, or none.
+struct SpawnResult {
+  std::vector<BallId> ids;        ///< one a ball when all were accepted, else empty
+  std::vector<Refusal> refusals;  ///< one a ball, in order
+
+  bool accepted() const { return ids.size() == refusals.size(); }
+};
+
+struct WorldOptions {
+  std::string method;               ///< overrides the scene's; empty: the scene's
+  std::optional<double> time_step;  ///< s, overrides the scene's
+  Precision precision = Precision::double_precision;
+  std::size_t max_balls = 10'000'000;
+};
+
+class World {
+ public:
+  /// Fills the scene and sets the clock to 0.
+  /// @throws PackingError, std::invalid_argument (method), Refused (a listed ball, named by index)
+  explicit World(const Scene& scene, const WorldOptions& options = {});
+
+  // --- time
+
+  Time now() const { return method_->now(); }
+
+  /// Moves on to `target`.
+  /// @param target      not before now()
+  /// @param max_events  stops early after this many events
+  /// @return true when `target` was reached; false: call again to go on
+  /// @throws std::invalid_argument  `target` in the past
+  bool advanceTo(Time target,
+                 std::uint64_t max_events = std::numeric_limits<std::uint64_t>::max());
+
+  // --- balls: read
+
+  std::size_t size() const { return ids_.size(); }
+  const std::vector<BallId>& ids() const { return ids_; }        ///< ascending
+  const std::vector<double>& radii() const { return radii_; }    ///< m, in the order of ids()
+  const std::vector<double>& masses() const { return masses_; }  ///< kg, in the order of ids()
+  bool contains(BallId id) const;
+  Ball ball(BallId id) const;                                    ///< @throws Refused unknown id
+  void read(BallStates& states) const { method_->read(states); }
+
+  // --- balls: change, at now()
+
+  /// Adds all the balls or none.
+  SpawnResult spawn(const std::vector<Ball>& balls);
+
+  /// Adds one. @throws Refused
+  BallId spawn(const Ball& ball);
+
+  /// Takes out all of `ids` or none; a repeated id counts once. @throws Refused naming unknown ids
+  void remove(const std::vector<BallId>& ids);
+  void removeAll();
+
+  /// Takes out what was added since the scene was loaded.
+  void removeSpawned();
+
+  /// @param impulse N s. @return the velocity before and after, m/s. @throws Refused
+  struct VelocityChange {
+    Vector3 before;
+    Vector3 after;
+  };
+  VelocityChange applyImpulse(BallId id, const Vector3& impulse);
+
+  /// Puts a ball elsewhere (checked as for spawn) and sets its velocity. @throws Refused
+  void setMotion(BallId id, const Vector3& position, const Vector3& velocity);
+
+  /// Everything as the scene has it, ids included; time goes on from now(), or begins at 0 again.
+  /// Statistics begin again.
+  void reset(bool restart_time);
+
+  // --- what it is, and how it goes
+
+  const Scene& scene() const { return scene_; }  ///< with box extents filled in
+  const Surroundings& surroundings() const { return scene_.surroundings; }
+  const MethodChoice& method() const { return choice_; }
+  Statistics statistics() const { return method_->statistics(); }
+  double kineticEnergy() const;    ///< J
+  double potentialEnergy() const;  ///< J
+  Vector3 momentum() const;        ///< kg m/s
+
+  /// Reports impacts into `log` from now on, across resets; nullptr: none.
+  void setCollisionLog(CollisionLog* log);
+
+ private:
+  std::size_t indexOf(BallId id) const;  // throws Refused
+  Refusal check(const Ball& ball, std::optional<BallId> itself) const;
+  void build(Time start);
+
+  Scene scene_;
+  WorldOptions options_;
+  MethodChoice choice_;
+  std::vector<Ball> initial_;  // the scene's balls, in order of id
+  std::unique_ptr<Method> method_;
+  std::vector<BallId> ids_;
+  std::vector<double> radii_;   // m
+  std::vector<double> masses_;  // kg
+  BallId next_id_ = 0;
+  CollisionLog* log_ = nullptr;
+};
+
+}  // namespace ball_sim
