@@ -1,0 +1,109 @@
+// The walls of a scene, box faces and planes alike, and balls that rest on them.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <vector>
+
+#include "ball_sim/surroundings.hpp"
+#include "ball_sim/vector.hpp"
+
+namespace ball_sim {
+
+/// A rigid wall at rest: inside is normal.x >= offset.
+template <class Real>
+struct Wall {
+  VectorOf<Real> normal;  ///< unit, inward
+  Real offset;            ///< m
+  Partner partner;        ///< its name in collisions
+};
+
+/// Every wall a ball can hit, in the order of the Partner numbers. A periodic box has none, a
+/// planar one no z faces.
+template <class Real>
+std::vector<Wall<Real>> wallsOf(const Surroundings& surroundings) {
+  std::vector<Wall<Real>> walls;
+  if (!surroundings.periodic) {
+    for (int axis = 0; axis < (surroundings.planar() ? 2 : 3); ++axis) {
+      const VectorOf<Real> unit = VectorOf<Real>::Unit(axis);
+      if (std::isfinite(surroundings.box.min[axis])) {
+        walls.push_back({unit, Real(surroundings.box.min[axis]), boxFace(axis, false)});
+      }
+      if (std::isfinite(surroundings.box.max[axis])) {
+        walls.push_back({-unit, -Real(surroundings.box.max[axis]), boxFace(axis, true)});
+      }
+    }
+  }
+  for (std::size_t k = 0; k < surroundings.planes.size(); ++k) {
+    const Plane& plane = surroundings.planes[k];
+    walls.push_back({plane.normal.cast<Real>(), Real(plane.offset), planePartner(k)});
+  }
+  return walls;
+}
+
+/// Below this share of its radius a ball's next bounce is not worth an event: it rests. The rest
+/// of its bouncing would last 2 u/(g (1 - e)) with u = sqrt(2 g r 1e-14), about 1e-7 s.
+constexpr double kRestingHeight = 1e-14;
+
+/// Whether a ball that leaves a wall is back before it got anywhere.
+/// @param speed  away from the wall, m/s, >= 0
+/// @param acceleration  along the inward normal, m/s^2
+template <class Real>
+bool comesToRest(Real speed, Real acceleration, Real radius) {
+  return acceleration < 0 && speed * speed <= -2 * acceleration * (Real(kRestingHeight) * radius);
+}
+
+/// The walls a ball rests on, at most three: these hold it in place.
+struct RestingContacts {
+  static constexpr int kMost = 3;
+  int count = 0;
+  int walls[kMost] = {-1, -1, -1};  ///< indices into wallsOf()
+
+  bool includes(int wall) const {
+    for (int i = 0; i < count; ++i) {
+      if (walls[i] == wall) return true;
+    }
+    return false;
+  }
+  void add(int wall) {
+    if (count < kMost) walls[count++] = wall;
+  }
+  void removeAt(int i) { walls[i] = walls[--count]; }
+};
+
+/// Gravity less what the walls push back: the acceleration of a ball that rests on them.
+/// @param walls  all walls of the scene
+/// @return m/s^2; into none of the contacts' walls
+template <class Real>
+VectorOf<Real> constrainedAcceleration(const VectorOf<Real>& gravity,
+                                       const std::vector<Wall<Real>>& walls,
+                                       const RestingContacts& contacts) {
+  const auto normal = [&](int i) {
+    return walls[static_cast<std::size_t>(contacts.walls[i])].normal;
+  };
+  const auto leaves_no_wall = [&](const VectorOf<Real>& a) {
+    const Real rounding = Real(1e-12) * gravity.norm();
+    for (int i = 0; i < contacts.count; ++i) {
+      if (dot(a, normal(i)) < -rounding) return false;
+    }
+    return true;
+  };
+  if (leaves_no_wall(gravity)) return gravity;
+  for (int i = 0; i < contacts.count; ++i) {  // slides on one wall
+    const VectorOf<Real> n = normal(i);
+    const VectorOf<Real> a = gravity - dot(gravity, n) * n;
+    if (leaves_no_wall(a)) return a;
+  }
+  for (int i = 0; i < contacts.count; ++i) {  // slides along an edge
+    for (int j = i + 1; j < contacts.count; ++j) {
+      const VectorOf<Real> edge = normal(i).cross(normal(j));
+      const Real squared = dot(edge, edge);
+      if (!(squared > 0)) continue;
+      const VectorOf<Real> a = (dot(gravity, edge) / squared) * edge;
+      if (leaves_no_wall(a)) return a;
+    }
+  }
+  return VectorOf<Real>::Zero();
+}
+
+}  // namespace ball_sim
