@@ -145,7 +145,6 @@ class BruteForce final : public Method {
     std::size_t a = 0;       // index of the ball
     std::size_t b = 0;       // index of the other ball, or of the wall
     bool with_wall = false;
-    Vec shift = Vec::Zero();  // image of b, m
   };
 
   typename std::vector<Body>::iterator find(BallId id) {
@@ -194,7 +193,7 @@ class BruteForce final : public Method {
     for (std::size_t a = 0; a < bodies_.size(); ++a) {
       for (std::size_t k = 0; k < walls_.size(); ++k) {
         const Real dt = wallTime(bodies_[a], k);
-        if (dt < first.dt) first = {dt, a, k, true, Vec::Zero()};
+        if (dt < first.dt) first = {dt, a, k, true};
       }
       for (std::size_t b = a + 1; b < bodies_.size(); ++b) considerPair(a, b, first);
     }
@@ -222,7 +221,7 @@ class BruteForce final : public Method {
           if (j != 0) image[1] += j * edge(1);
           if (k != 0) image[2] += k * edge(2);
           const Real dt = pairTime(bodies_[a], bodies_[b], image);
-          if (dt < first.dt) first = {dt, a, b, false, image - dx};
+          if (dt < first.dt) first = {dt, a, b, false};
         }
       }
     }
@@ -264,12 +263,12 @@ class BruteForce final : public Method {
     if (event.with_wall) {
       resolveWall(bodies_[event.a], static_cast<int>(event.b));
     } else {
-      resolvePair(bodies_[event.a], bodies_[event.b], event.shift);
+      resolvePair(bodies_[event.a], bodies_[event.b]);
     }
   }
 
-  void resolvePair(Body& a, Body& b, const Vec& shift) {
-    const Vec dx = b.x + shift - a.x;
+  void resolvePair(Body& a, Body& b) {
+    const Vec dx = nearestImage(b.x - a.x);
     const Vec n = contactNormal<Real>(dx);
     const Real reach = a.radius + b.radius;
     const Real speed = dot(a.v, n) - dot(b.v, n);

@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "ball_sim/brute_force.hpp"
+#include "event_driven/make_event_driven.hpp"
 
 namespace ball_sim {
 
@@ -19,21 +20,15 @@ std::string listOf(const std::vector<std::string>& names) {
   throw std::invalid_argument("method: '" + name + "': must be one of " + listOf(methodNames()));
 }
 
-template <class Real>
-std::unique_ptr<Method> make(const std::string& name, const Surroundings& surroundings) {
-  if (name == "brute_force") return std::make_unique<BruteForce<Real>>(surroundings);
-  refuse(name);
-}
-
 }  // namespace
 
 const std::vector<std::string>& methodNames() {
-  static const std::vector<std::string> names = {"auto", "brute_force"};
+  static const std::vector<std::string> names = {"auto", "event_driven", "brute_force"};
   return names;
 }
 
 MethodChoice chooseMethod(const std::string& name, const Scene& /*scene*/) {
-  if (name == "auto") return {"brute_force", "the only method so far"};
+  if (name == "auto") return {"event_driven", "exact to rounding, and fast at any density"};
   const auto& names = methodNames();
   if (std::find(names.begin(), names.end(), name) == names.end()) refuse(name);
   return {name, "asked for"};
@@ -41,8 +36,12 @@ MethodChoice chooseMethod(const std::string& name, const Scene& /*scene*/) {
 
 std::unique_ptr<Method> makeMethod(const std::string& name, const Surroundings& surroundings,
                                    Precision precision) {
-  return precision == Precision::long_double ? make<long double>(name, surroundings)
-                                             : make<double>(name, surroundings);
+  if (name == "event_driven") return makeEventDriven(surroundings, precision);
+  if (name != "brute_force") refuse(name);
+  if (precision == Precision::double_precision) {
+    return std::make_unique<BruteForce<double>>(surroundings);
+  }
+  return std::make_unique<BruteForce<long double>>(surroundings);
 }
 
 }  // namespace ball_sim

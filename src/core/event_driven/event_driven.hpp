@@ -1,0 +1,792 @@
+// Method event_driven: hard-sphere event-driven dynamics. Nothing happens between impacts, so only
+// impacts are computed, in order of time, each exact to rounding.
+//
+// Every ball holds its own next event (an impact with a ball or wall, or the crossing into another
+// cell) and sits once in the queue. An impact found with a partner that has meanwhile changed is
+// noticed when it comes up (the partner's version tells) and searched again. A ball's place is
+// stored at its own last change and nowhere else: reading, crossing and searching leave no trace in
+// the trajectory.
+//
+// Gets right: everything hard and elastic or dissipative, any masses and radii, walls, gravity,
+// at any speed: no impact is missed, none is seen twice. Misses: contact that lasts. A ball comes
+// to rest on walls; a ball on another ball keeps bouncing, ever lower, down to a hum of 1e-6 of
+// their radii. Simultaneous impacts are taken one after the other, by the smaller ids first.
+// Limits: 2^27 balls; 2^30 cells from the origin of an open scene.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <stdexcept>
+#include <vector>
+
+#include "ball_sim/collapse_guard.hpp"
+#include "ball_sim/collision_law.hpp"
+#include "ball_sim/method.hpp"
+#include "ball_sim/time_of_impact.hpp"
+#include "ball_sim/walls.hpp"
+#include "event_driven/cell_grid.hpp"
+#include "event_driven/event_queue.hpp"
+#include "event_driven/grid_layout.hpp"
+
+namespace ball_sim {
+
+/// @tparam Real      double or long double
+/// @tparam kGravity  whether balls fall; without it no acceleration is stored or computed
+template <class Real, bool kGravity>
+class EventDriven final : public Method {
+  using Vec = VectorOf<Real>;
+
+ public:
+  explicit EventDriven(const Surroundings& surroundings)
+      : surroundings_(surroundings),
+        gravity_(surroundings.gravity.cast<Real>()),
+        restitution_(Real(surroundings.restitution)),
+        walls_(wallsOf<Real>(surroundings)) {
+    for (std::size_t k = 0; k < walls_.size(); ++k) {
+      const Partner partner = walls_[k].partner;
+      if (partner > planePartner(0)) {
+        face_walls_[static_cast<std::size_t>(-1 - partner)] = static_cast<std::int32_t>(k);
+      } else {
+        planes_.push_back(static_cast<std::uint32_t>(k));
+      }
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!surroundings.periodic || (axis == 2 && surroundings.planar())) continue;
+      period_[axis] = Real(surroundings.box.max[axis]) - Real(surroundings.box.min[axis]);
+    }
+    for (int image = 0; image < 27; ++image) {
+      image_shift_[static_cast<std::size_t>(image)] = {Real(image % 3 - 1) * period_[0],
+                                                       Real(image / 3 % 3 - 1) * period_[1],
+                                                       Real(image / 9 - 1) * period_[2]};
+    }
+  }
+
+  const char* name() const override { return "event_driven"; }
+
+  void insert(BallId id, const Ball& ball) override {
+    assert(slots_.empty() || ids_[slots_.back()] < id);
+    const Slot slot = takeSlot();
+    Body& body = bodies_[slot];
+    body = {ball.position.cast<Real>(), ball.velocity.cast<Real>(), now_, Real(ball.radius)};
+    masses_[slot] = ball.mass;
+    inverse_masses_[slot] = std::isinf(ball.mass) ? Real(0) : 1 / Real(ball.mass);
+    ids_[slot] = id;
+    slots_.push_back(slot);
+    histories_[slot] = {};
+    if constexpr (kGravity) {
+      accelerations_[slot] = isFixed(slot) ? Vec(Vec::Zero()) : gravity_;
+      resting_[slot] = {};
+    }
+    Agenda& agenda = agendas_[slot];
+    agenda.links = {};
+    ++agenda.version;
+    if (slots_.size() > 2 * balls_at_layout_ + 16 || !fits(body)) ready_ = false;
+    if (ready_) {
+      place(slot);
+      search(slot, kNoSlot);
+    }
+  }
+
+  void remove(BallId id) override {
+    const auto found = find(id);
+    const Slot slot = *found;
+    if (ready_) lift(slot);
+    ++agendas_[slot].version;
+    slots_.erase(found);
+    free_slots_.push_back(slot);
+  }
+
+  void setMotion(BallId id, const Vector3& position, const Vector3& velocity) override {
+    const Slot slot = *find(id);
+    if (ready_) lift(slot);
+    Body& body = bodies_[slot];
+    body.x = position.cast<Real>();
+    body.v = velocity.cast<Real>();
+    body.time = now_;
+    ++agendas_[slot].version;
+    if constexpr (kGravity) {
+      resting_[slot] = {};
+      accelerations_[slot] = gravity_;
+    }
+    if (ready_) {
+      place(slot);
+      search(slot, kNoSlot);
+    }
+  }
+
+  void setVelocity(BallId id, const Vector3& velocity) override {
+    const Slot slot = *find(id);
+    settle(slot);
+    bodies_[slot].v = velocity.cast<Real>();
+    velocityChanged(slot);
+    if (ready_) {
+      queue_.remove(*this, slot);
+      search(slot, kNoSlot);
+    }
+  }
+
+  bool advanceTo(Time target, std::uint64_t max_events) override {
+    if (!ready_) layOut();
+    while (true) {
+      const Real limit = Real(target - origin_);
+      const Slot slot = queue_.peek(*this, limit);
+      if (slot == kNoSlot) {
+        if (limit < queue_.yearLength()) {
+          now_ = limit;
+          reached_ = target;
+          return true;
+        }
+        turnYear(limit);
+        continue;
+      }
+      if (max_events == 0) {
+        reached_ = origin_ + double(now_);
+        return false;
+      }
+      --max_events;
+      now_ = std::max(now_, due(slot));
+      queue_.pop(*this);
+      ++statistics_.events;
+      handle(slot);
+    }
+  }
+  using Method::advanceTo;
+
+  Time now() const override { return reached_; }
+
+  void read(BallStates& states) const override {
+    states.time = now();
+    states.ids.resize(slots_.size());
+    states.positions.resize(slots_.size());
+    states.velocities.resize(slots_.size());
+    for (std::size_t i = 0; i < slots_.size(); ++i) {
+      const Slot slot = slots_[i];
+      states.ids[i] = ids_[slot];
+      states.positions[i] = wrapped(positionNow(slot)).template cast<double>();
+      states.velocities[i] = velocityNow(slot).template cast<double>();
+    }
+  }
+
+  Ball ball(BallId id) const override {
+    const Slot slot = *find(id);
+    return {wrapped(positionNow(slot)).template cast<double>(),
+            velocityNow(slot).template cast<double>(), double(bodies_[slot].radius), masses_[slot]};
+  }
+
+  std::optional<BallId> findOverlap(const Vector3& position, double radius,
+                                    std::optional<BallId> ignore) const override {
+    std::optional<BallId> found;
+    for (const Slot slot : slots_) {
+      const BallId id = ids_[slot];
+      if (id == ignore || (found && *found < id)) continue;
+      const Vec dx = nearestImage(positionNow(slot) - position.cast<Real>());
+      const Real reach = (bodies_[slot].radius + Real(radius)) * (1 - Real(1e-12));
+      if (dot(dx, dx) < reach * reach) found = id;
+    }
+    return found;
+  }
+
+  Statistics statistics() const override {
+    Statistics statistics = statistics_;
+    statistics.queue_depth = slots_.size();
+    statistics.bytes = grid_.bytes() + queue_.bytes() + capacityBytes(bodies_) +
+                       capacityBytes(agendas_) + capacityBytes(inverse_masses_) +
+                       capacityBytes(masses_) + capacityBytes(ids_) + capacityBytes(slots_) +
+                       capacityBytes(histories_) + capacityBytes(accelerations_) +
+                       capacityBytes(resting_);
+    return statistics;
+  }
+
+  void setCollisionLog(CollisionLog* log) override { log_ = log; }
+
+  // --- what the queue asks of its entries
+
+  Real due(Slot slot) const {
+    return std::min(agendas_[slot].impact_time, agendas_[slot].crossing_time);
+  }
+  QueueLinks& links(Slot slot) { return agendas_[slot].links; }
+  bool before(Slot a, Slot b) const { return tieOrder(a) < tieOrder(b); }
+
+ private:
+  // What others look at, in one cache line: the place at the ball's own time.
+  struct alignas(64) Body {
+    Vec x;      // m, at `time`
+    Vec v;      // m/s, at `time`
+    Real time;  // s, in this year
+    Real radius;
+  };
+
+  // What only the ball itself needs: its next event, its cell, its place in the queue.
+  struct alignas(64) Agenda {
+    Real impact_time = kNever<Real>;    // s, in this year
+    Real crossing_time = kNever<Real>;  // s, in this year
+    std::uint32_t partner = 0;          // slot, or kWall + index into walls_
+    std::uint32_t partner_version = 0;  // the partner's version when the impact was found
+    std::uint32_t version = 0;          // counts the changes of this ball's trajectory
+    QueueLinks links;
+    CellCoordinates cell = {0, 0, 0};
+    std::int8_t crossing_axis = 0;
+    std::int8_t crossing_direction = 0;  // -1 or +1
+    std::uint8_t level = 0;              // index into the grid's levels
+  };
+
+  static constexpr std::uint32_t kWall = 0xF8000000;
+
+  struct Found {
+    Real time = kNever<Real>;  // s, in this year
+    std::uint32_t partner = 0;
+  };
+
+  template <class T>
+  static std::size_t capacityBytes(const std::vector<T>& v) {
+    return v.capacity() * sizeof(T);
+  }
+
+  // --- ids and slots
+
+  std::vector<Slot>::iterator find(BallId id) {
+    return std::lower_bound(slots_.begin(), slots_.end(), id,
+                            [this](Slot slot, BallId other) { return ids_[slot] < other; });
+  }
+  std::vector<Slot>::const_iterator find(BallId id) const {
+    return const_cast<EventDriven*>(this)->find(id);
+  }
+
+  Slot takeSlot() {
+    if (!free_slots_.empty()) {
+      const Slot slot = free_slots_.back();
+      free_slots_.pop_back();
+      return slot;
+    }
+    const std::size_t count = bodies_.size() + 1;
+    bodies_.resize(count);
+    agendas_.resize(count);
+    inverse_masses_.resize(count);
+    masses_.resize(count);
+    ids_.resize(count);
+    histories_.resize(count);
+    if constexpr (kGravity) {
+      accelerations_.resize(count);
+      resting_.resize(count);
+    }
+    grid_.resize(count);
+    return static_cast<Slot>(count - 1);
+  }
+
+  bool isFixed(Slot slot) const { return inverse_masses_[slot] == 0; }
+
+  // Order of events at one instant: smaller id, then larger id; a crossing has no second partner.
+  std::pair<Partner, Partner> tieOrder(Slot slot) const {
+    const Agenda& agenda = agendas_[slot];
+    const Partner self = ids_[slot];
+    if (agenda.crossing_time < agenda.impact_time) return {self, self};
+    const Partner other = agenda.partner >= kWall ? walls_[agenda.partner - kWall].partner
+                                                  : Partner{ids_[agenda.partner]};
+    return {std::min(self, other), std::max(self, other)};
+  }
+
+  // --- motion between events
+
+  Vec positionAt(Slot slot, Real time) const {
+    const Body& body = bodies_[slot];
+    const Real dt = time - body.time;
+    if constexpr (kGravity) return body.x + dt * (body.v + (dt / 2) * accelerations_[slot]);
+    return body.x + dt * body.v;
+  }
+
+  Vec velocityAt(Slot slot, Real time) const {
+    const Body& body = bodies_[slot];
+    if constexpr (kGravity) return body.v + (time - body.time) * accelerations_[slot];
+    return body.v;
+  }
+
+  Vec positionNow(Slot slot) const { return positionAt(slot, now_); }
+  Vec velocityNow(Slot slot) const { return velocityAt(slot, now_); }
+
+  // Stores the place of now, for a change of velocity to start from.
+  void settle(Slot slot) {
+    Body& body = bodies_[slot];
+    body.x = positionNow(slot);
+    body.v = velocityNow(slot);
+    body.time = now_;
+  }
+
+  Vec nearestImage(Vec dx) const {
+    using std::floor;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (period_[axis] > 0)
+        dx[axis] -= floor(dx[axis] / period_[axis] + Real(0.5)) * period_[axis];
+    }
+    return dx;
+  }
+
+  // A crossing puts a ball back into the periodic box a rounding error early or late.
+  Vec wrapped(Vec x) const {
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(period_[axis] > 0)) continue;
+      if (x[axis] < Real(surroundings_.box.min[axis])) x[axis] += period_[axis];
+      if (x[axis] >= Real(surroundings_.box.max[axis])) x[axis] -= period_[axis];
+    }
+    return x;
+  }
+
+  // --- layout: cells and calendar
+
+  bool fits(const Body& body) const {
+    return ready_ && 2 * body.radius * Real(kCellMargin) <= coarsest_edge_;
+  }
+
+  std::uint8_t levelOf(Real radius) const {
+    std::size_t level = grid_.levels().size() - 1;
+    using std::ldexp;
+    while (level > 0 &&
+           ldexp(coarsest_edge_, -grid_.levels()[level].depth()) < 2 * radius * Real(kCellMargin)) {
+      --level;
+    }
+    return static_cast<std::uint8_t>(level);
+  }
+
+  // Builds grid and calendar for the balls as they are now, and finds every ball's next event.
+  void layOut() {
+    std::vector<GridBall<Real>> balls;
+    balls.reserve(slots_.size());
+    for (const Slot slot : slots_) {
+      balls.push_back({positionNow(slot), bodies_[slot].radius});
+    }
+    grid_ = layOutGrid<Real>(surroundings_, balls);
+    grid_.resize(bodies_.size());
+    coarsest_edge_ = coarsestEdge(grid_);
+    for (const Slot slot : slots_) place(slot);
+    balls_at_layout_ = slots_.size();
+    ready_ = true;
+    for (const Slot slot : slots_) {
+      agendas_[slot].links = {};
+      findNextEvent(slot, kNoSlot);
+    }
+    setCalendar(estimatedEventRate());
+  }
+
+  // Events per second, from the times at which half of the balls have their next one.
+  Real estimatedEventRate() const {
+    std::vector<Real> waits;
+    for (const Slot slot : slots_) {
+      const Real wait = due(slot) - now_;
+      if (wait > 0 && wait < kNever<Real>) waits.push_back(wait);
+    }
+    if (waits.empty()) return 0;
+    const auto middle = waits.begin() + static_cast<std::ptrdiff_t>(waits.size() / 2);
+    std::nth_element(waits.begin(), middle, waits.end());
+    return Real(0.7) * Real(waits.size()) / *middle;
+  }
+
+  // A year of about four events a ball, a bucket of a few events.
+  void setCalendar(Real events_per_second) {
+    std::uint32_t buckets = 64;
+    while (buckets < slots_.size()) buckets *= 2;
+    const Real width = events_per_second > 0 ? kEventsPerBucket / events_per_second : Real(1);
+    // Clocks restart with the calendar.
+    shiftClocks(now_);
+    queue_.reset(floorToPowerOfTwo(width), buckets);
+    for (const Slot slot : slots_) {
+      agendas_[slot].links = {};
+      queue_.insert(*this, slot);
+    }
+    events_at_new_year_ = statistics_.events;
+  }
+
+  static Real floorToPowerOfTwo(Real x) {
+    int exponent = 0;
+    using std::frexp;
+    using std::ldexp;
+    (void)frexp(x, &exponent);
+    return ldexp(Real(1), exponent - 1);
+  }
+
+  void shiftClocks(Real by) {
+    if (by == 0) return;
+    origin_ = origin_ + double(by);
+    now_ -= by;
+    for (const Slot slot : slots_) {
+      bodies_[slot].time -= by;
+      agendas_[slot].impact_time -= by;
+      agendas_[slot].crossing_time -= by;
+      histories_[slot].last -= by;
+    }
+  }
+
+  // Moves all clocks back by whole years, to the next one in which anything happens.
+  void turnYear(Real limit) {
+    const Real year = queue_.yearLength();
+    const Real next = std::min(limit, queue_.earliestBeyond(*this));
+    const Real years = std::max(Real(1), std::floor(next / year));
+    now_ = years * year;
+    shiftClocks(now_);
+    // A place stored many years ago would lose digits of its time.
+    for (const Slot slot : slots_) {
+      if (bodies_[slot].time < -16 * year) settle(slot);
+    }
+    queue_.turnYear(*this);
+    retuneCalendar(years);
+  }
+
+  void retuneCalendar(Real years) {
+    const auto events = Real(statistics_.events - events_at_new_year_);
+    events_at_new_year_ = statistics_.events;
+    const Real per_bucket = events / (years * queue_.yearLength() / queue_.bucketWidth());
+    const bool off = per_bucket > 4 * kEventsPerBucket || 4 * per_bucket < kEventsPerBucket;
+    if (off && events > 0) setCalendar(per_bucket / queue_.bucketWidth());
+  }
+
+  // Takes a ball into the periodic box by whole periods.
+  void bringHome(Slot slot) {
+    using std::floor;
+    const Vec x = positionNow(slot);
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(period_[axis] > 0)) continue;
+      const Real turns = floor((x[axis] - Real(surroundings_.box.min[axis])) / period_[axis]);
+      if (turns != 0) bodies_[slot].x[axis] -= turns * period_[axis];
+    }
+  }
+
+  void place(Slot slot) {
+    Agenda& agenda = agendas_[slot];
+    bringHome(slot);
+    agenda.level = levelOf(bodies_[slot].radius);
+    agenda.cell = grid_.coordinatesOf(positionNow(slot), grid_.levels()[agenda.level].depth());
+    grid_.link(slot, agenda.cell, agenda.level);
+  }
+
+  void lift(Slot slot) {
+    queue_.remove(*this, slot);
+    grid_.unlink(slot, agendas_[slot].cell, agendas_[slot].level);
+  }
+
+  // --- events
+
+  void handle(Slot slot) {
+    const Agenda& agenda = agendas_[slot];
+    if (agenda.crossing_time < agenda.impact_time) {
+      cross(slot);
+    } else if (agenda.partner >= kWall) {
+      meetWall(slot, agenda.partner - kWall);
+    } else if (agendas_[agenda.partner].version == agenda.partner_version) {
+      meetBall(slot, agenda.partner);
+    } else {
+      search(slot, kNoSlot);
+    }
+  }
+
+  void cross(Slot slot) {
+    Agenda& agenda = agendas_[slot];
+    const int axis = agenda.crossing_axis;
+    const auto k = static_cast<std::size_t>(axis);
+    const CellCoordinates before = agenda.cell;
+    grid_.unlink(slot, before, agenda.level);
+    agenda.cell[k] += agenda.crossing_direction;
+    if (period_[axis] > 0) {
+      const std::int32_t count = grid_.count(k, grid_.levels()[agenda.level].depth());
+      if (agenda.cell[k] < 0) {
+        agenda.cell[k] = count - 1;
+        bodies_[slot].x[axis] += period_[axis];
+      } else if (agenda.cell[k] == count) {
+        agenda.cell[k] = 0;
+        bodies_[slot].x[axis] -= period_[axis];
+      }
+    } else if (agenda.cell[k] > kFarthestCell || agenda.cell[k] < -kFarthestCell) {
+      throw std::range_error("ball " + std::to_string(ids_[slot]) + " has flown 2^30 cells away");
+    }
+    grid_.link(slot, agenda.cell, agenda.level);
+    candidates_.clear();
+    grid_.visitNewLayer(before, agenda.cell, agenda.level, axis,
+                        agenda.crossing_direction > 0 ? 2 : 0, [&](Slot other, Image image) {
+                          candidates_.push_back({other, image});
+                        });
+    Found found{agenda.impact_time, agenda.partner};
+    const Real old_time = found.time;
+    considerBalls(slot, kNoSlot, found);
+    considerWallsOf(slot, found);
+    if (found.time < old_time) setImpact(slot, found);
+    findCrossing(slot);
+    queue_.insert(*this, slot);
+  }
+
+  void meetBall(Slot first, Slot second) {
+    if (ids_[second] < ids_[first]) std::swap(first, second);
+    settle(first);
+    settle(second);
+    Body& a = bodies_[first];
+    Body& b = bodies_[second];
+    const Vec dx = nearestImage(b.x - a.x);
+    const Vec n = contactNormal<Real>(dx);
+    const Real reach = a.radius + b.radius;
+    Real e = restitution_;
+    if (e < 1) {
+      const Real speed = dot(a.v, n) - dot(b.v, n);
+      const bool a_collapses = histories_[first].record(now_, speed, reach);
+      const bool b_collapses = histories_[second].record(now_, speed, reach);
+      if (a_collapses || b_collapses) e = 1;
+    }
+    Real least = 0;
+    if constexpr (kGravity) {
+      least =
+          leastRebound<Real>(dot(Vec(accelerations_[first] - accelerations_[second]), n), reach);
+    }
+    const Exchange<Real> passed =
+        collide<Real>(a.v, inverse_masses_[first], b.v, inverse_masses_[second], n, e, least);
+    if (passed.impulse > 0) {
+      ++statistics_.ball_collisions;
+      statistics_.virial += double(passed.impulse * reach);
+      noteOverlap(reach - dot(dx, n));
+      report(first, ids_[second], n, passed.impulse, passed.approach_speed);
+    }
+    velocityChanged(first);
+    velocityChanged(second);
+    queue_.remove(*this, first);
+    queue_.remove(*this, second);
+    search(first, second);
+    search(second, first);
+  }
+
+  void meetWall(Slot slot, std::uint32_t index) {
+    settle(slot);
+    Body& body = bodies_[slot];
+    const Wall<Real>& wall = walls_[index];
+    Real pull = 0;
+    if constexpr (kGravity) pull = dot(accelerations_[slot], wall.normal);
+    const Real speed = -dot(body.v, wall.normal);
+    Real e = restitution_;
+    if (e < 1 && !(pull < 0) && histories_[slot].record(now_, speed, body.radius)) e = 1;
+    noteOverlap(wall.offset + body.radius - dot(body.x, wall.normal));
+    collideWithWall<Real>(body.v, wall.normal, e);
+    if constexpr (kGravity) {
+      if (comesToRest<Real>(dot(body.v, wall.normal), pull, body.radius)) {
+        resting_[slot].add(static_cast<int>(index));
+      }
+    }
+    if (speed > 0) {
+      ++statistics_.wall_collisions;
+      report(slot, wall.partner, -wall.normal, (1 + e) * speed / inverse_masses_[slot], speed);
+    }
+    velocityChanged(slot);
+    search(slot, kNoSlot);
+  }
+
+  // After any change of velocity: events found with the old one are stale; walls rested on are
+  // left or kept.
+  void velocityChanged(Slot slot) {
+    ++agendas_[slot].version;
+    if constexpr (kGravity) {
+      RestingContacts& resting = resting_[slot];
+      if (resting.count == 0) return;
+      Body& body = bodies_[slot];
+      for (int i = resting.count - 1; i >= 0; --i) {
+        const Wall<Real>& wall = walls_[static_cast<std::size_t>(resting.walls[i])];
+        const Real speed = dot(body.v, wall.normal);
+        if (speed < 0 || !comesToRest<Real>(speed, dot(gravity_, wall.normal), body.radius)) {
+          resting.removeAt(i);
+        } else {
+          body.v -= speed * wall.normal;
+        }
+      }
+      accelerations_[slot] = constrainedAcceleration<Real>(gravity_, walls_, resting);
+    }
+  }
+
+  // --- search for a ball's next event
+
+  // Finds the next event of a ball that is not queued, and queues it.
+  // `just_met`: a partner it touches and has just parted from
+  void search(Slot slot, Slot just_met) {
+    findNextEvent(slot, just_met);
+    queue_.insert(*this, slot);
+  }
+
+  void findNextEvent(Slot slot, Slot just_met) {
+    const Agenda& agenda = agendas_[slot];
+    candidates_.clear();
+    grid_.visitNear(agenda.cell, agenda.level, [&](Slot other, Image image) {
+      candidates_.push_back({other, image});
+    });
+    Found found;
+    considerBalls(slot, just_met, found);
+    considerWallsOf(slot, found);
+    setImpact(slot, found);
+    findCrossing(slot);
+  }
+
+  void setImpact(Slot slot, const Found& found) {
+    Agenda& agenda = agendas_[slot];
+    agenda.impact_time = found.time;
+    agenda.partner = found.partner;
+    agenda.partner_version =
+        found.partner < kWall && found.time < kNever<Real> ? agendas_[found.partner].version : 0;
+  }
+
+  void considerBalls(Slot slot, Slot just_met, Found& found) const {
+    const Vec x = positionNow(slot);
+    const Vec v = velocityNow(slot);
+    const Real radius = bodies_[slot].radius;
+    for (const Candidate& candidate : candidates_) {
+      const Slot other = candidate.slot;
+      if (other == slot) continue;
+      Vec dx = positionNow(other) - x;
+      if (candidate.image != kHomeImage) dx += image_shift_[candidate.image];
+      const Vec dv = velocityNow(other) - v;
+      const Real reach = bodies_[other].radius + radius;
+      // In straight relative motion two balls that have just met do not meet again.
+      const bool met = other == just_met && dot(dx, dx) < reach * reach * Real(1 + 1e-6);
+      const Real time = now_ + timeToBall(slot, other, dx, dv, reach, met);
+      if (time < found.time || (time == found.time && isEarlierTie(other, found))) {
+        found = {time, other};
+      }
+    }
+  }
+
+  Real timeToBall(Slot slot, Slot other, const Vec& dx, const Vec& dv, Real reach, bool met) const {
+    if constexpr (kGravity) {
+      const Vec da = accelerations_[other] - accelerations_[slot];
+      if (dot(da, da) > 0) return timeOfImpactAccelerated<Real>(dx, dv, da, reach);
+    }
+    return met ? kNever<Real> : timeOfImpact<Real>(dx, dv, reach);
+  }
+
+  bool isEarlierTie(Slot other, const Found& found) const {
+    return found.time < kNever<Real> && found.partner < kWall && ids_[other] < ids_[found.partner];
+  }
+
+  // Box faces are only met from the cells beside them; planes from anywhere.
+  void considerWallsOf(Slot slot, Found& found) const {
+    if (walls_.empty() || isFixed(slot)) return;
+    const Agenda& agenda = agendas_[slot];
+    const int depth = grid_.levels()[agenda.level].depth();
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const GridAxis<Real>& grid_axis = grid_.axis(axis);
+      if (grid_axis.lower_wall && agenda.cell[axis] == 0) {
+        considerWall(slot, face_walls_[2 * axis], found);
+      }
+      if (grid_axis.upper_wall && agenda.cell[axis] == grid_.count(axis, depth) - 1) {
+        considerWall(slot, face_walls_[2 * axis + 1], found);
+      }
+    }
+    for (const std::uint32_t plane : planes_) {
+      considerWall(slot, static_cast<std::int32_t>(plane), found);
+    }
+  }
+
+  void considerWall(Slot slot, std::int32_t index, Found& found) const {
+    const Wall<Real>& wall = walls_[static_cast<std::size_t>(index)];
+    Real pull = 0;
+    if constexpr (kGravity) {
+      if (resting_[slot].includes(index)) return;
+      pull = dot(accelerations_[slot], wall.normal);
+    }
+    const Real gap = dot(positionNow(slot), wall.normal) - wall.offset - bodies_[slot].radius;
+    const Real time = now_ + timeToWall<Real>(gap, dot(velocityNow(slot), wall.normal), pull);
+    if (time < found.time) found = {time, kWall + static_cast<std::uint32_t>(index)};
+  }
+
+  // When and where the ball leaves its cell. There is no way out through a wall.
+  void findCrossing(Slot slot) {
+    Agenda& agenda = agendas_[slot];
+    agenda.crossing_time = kNever<Real>;
+    if (isFixed(slot)) return;
+    const Vec x = positionNow(slot);
+    const Vec v = velocityNow(slot);
+    const int depth = grid_.levels()[agenda.level].depth();
+    for (std::size_t k = 0; k < 3; ++k) {
+      const GridAxis<Real>& axis = grid_.axis(k);
+      if (axis.flat) continue;
+      const int i = static_cast<int>(k);
+      const Real edge = grid_.edge(k, depth);
+      const Real lower = x[i] - (axis.origin + Real(agenda.cell[k]) * edge);
+      const Real upper = (axis.origin + Real(agenda.cell[k] + 1) * edge) - x[i];
+      Real a = 0;
+      if constexpr (kGravity) a = accelerations_[slot][i];
+      if (v[i] < 0 || a < 0) considerCrossing(agenda, timeToWall<Real>(lower, v[i], a), k, -1);
+      if (v[i] > 0 || a > 0) considerCrossing(agenda, timeToWall<Real>(upper, -v[i], -a), k, 1);
+    }
+  }
+
+  void considerCrossing(Agenda& agenda, Real dt, std::size_t axis, int direction) const {
+    const GridAxis<Real>& grid_axis = grid_.axis(axis);
+    const int depth = grid_.levels()[agenda.level].depth();
+    if (direction < 0 && grid_axis.lower_wall && agenda.cell[axis] == 0) return;
+    if (direction > 0 && grid_axis.upper_wall &&
+        agenda.cell[axis] == grid_.count(axis, depth) - 1) {
+      return;
+    }
+    if (now_ + dt < agenda.crossing_time) {
+      agenda.crossing_time = now_ + dt;
+      agenda.crossing_axis = static_cast<std::int8_t>(axis);
+      agenda.crossing_direction = static_cast<std::int8_t>(direction);
+    }
+  }
+
+  // --- bookkeeping
+
+  void noteOverlap(Real overlap) {
+    statistics_.deepest_overlap = std::max(statistics_.deepest_overlap, double(overlap));
+  }
+
+  void report(Slot slot, Partner b, const Vec& n, Real impulse, Real speed) {
+    if (log_ == nullptr) return;
+    Collision collision;
+    collision.time = origin_ + double(now_);
+    collision.a = ids_[slot];
+    collision.b = b;
+    collision.point = wrapped(bodies_[slot].x + bodies_[slot].radius * n).template cast<double>();
+    collision.normal = n.template cast<double>();
+    collision.impulse = double(impulse);
+    collision.approach_speed = double(speed);
+    log_->add(collision);
+  }
+
+  struct Candidate {
+    Slot slot;
+    Image image;
+  };
+
+  static constexpr Real kEventsPerBucket = 4;
+  static constexpr std::int32_t kFarthestCell = 1 << 30;
+
+  Surroundings surroundings_;
+  Vec gravity_;
+  Real restitution_;
+  std::vector<Wall<Real>> walls_;
+  std::array<std::int32_t, 6> face_walls_{};  // indices into walls_, by face
+  std::vector<std::uint32_t> planes_;         // indices into walls_
+  Vec period_ = Vec::Zero();                  // m; 0: that axis does not wrap
+  std::array<Vec, 27> image_shift_;           // m
+
+  // One entry a slot; a slot is reused when its ball is removed.
+  std::vector<Body> bodies_;
+  std::vector<Agenda> agendas_;
+  std::vector<Real> inverse_masses_;  // 1/kg
+  std::vector<double> masses_;        // kg
+  std::vector<BallId> ids_;
+  std::vector<ImpactHistory<Real>> histories_;
+  std::vector<Vec> accelerations_;  // m/s^2; only with gravity
+  std::vector<RestingContacts> resting_;
+  std::vector<Slot> slots_;  // of the balls there are, by ascending id
+  std::vector<Slot> free_slots_;
+
+  CellGrid<Real> grid_;
+  Real coarsest_edge_ = 0;  // m, the shortest edge of a cell of the coarsest level
+  std::size_t balls_at_layout_ = 0;
+  bool ready_ = false;  // grid and queue hold all balls
+  EventQueue<Real, EventDriven> queue_;
+  std::vector<Candidate> candidates_;  // scratch of a search
+
+  Time origin_;   // when this year began
+  Real now_ = 0;  // s, in this year
+  Time reached_;  // what now() tells
+  std::uint64_t events_at_new_year_ = 0;
+  Statistics statistics_;
+  CollisionLog* log_ = nullptr;
+};
+
+}  // namespace ball_sim

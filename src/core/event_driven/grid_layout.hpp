@@ -1,0 +1,142 @@
+// How to cut space for a given set of balls: how wide the cells are, and which levels there are.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "ball_sim/surroundings.hpp"
+#include "event_driven/cell_grid.hpp"
+
+namespace ball_sim {
+
+/// Cells are wider than the balls by this, more than rounding ever moves a ball out of its cell.
+constexpr double kCellMargin = 1 + 1e-9;
+
+/// Balls per cell of a dilute scene; wider cells are crossed less often, but show more balls.
+constexpr double kBallsPerCell = 0.5;
+
+/// What the layout needs to know of a ball.
+template <class Real>
+struct GridBall {
+  VectorOf<Real> x;  ///< m
+  Real radius;       ///< m
+};
+
+namespace detail {
+
+// Where balls are, or may be: the box, and on open axes the space the balls take now.
+template <class Real>
+void extent(const Surroundings& surroundings, const std::vector<GridBall<Real>>& balls, int axis,
+            Real& low, Real& high) {
+  low = Real(surroundings.box.min[axis]);
+  high = Real(surroundings.box.max[axis]);
+  if (std::isfinite(surroundings.box.min[axis]) && std::isfinite(surroundings.box.max[axis]))
+    return;
+  Real least = kNever<Real>;
+  Real most = -kNever<Real>;
+  for (const GridBall<Real>& ball : balls) {
+    least = std::min(least, Real(ball.x[axis] - ball.radius));
+    most = std::max(most, Real(ball.x[axis] + ball.radius));
+  }
+  if (balls.empty()) {
+    least = -1;
+    most = 1;
+  }
+  if (!std::isfinite(surroundings.box.min[axis])) low = std::min(least, high);
+  if (!std::isfinite(surroundings.box.max[axis])) high = std::max(most, low);
+}
+
+}  // namespace detail
+
+template <class Real>
+Real coarsestEdge(const CellGrid<Real>& grid) {
+  Real shortest = kNever<Real>;
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (!grid.axis(k).flat) shortest = std::min(shortest, grid.edge(k, 0));
+  }
+  return shortest;
+}
+
+/// @param balls  finite; may be empty
+template <class Real>
+CellGrid<Real> layOutGrid(const Surroundings& surroundings,
+                          const std::vector<GridBall<Real>>& balls) {
+  using std::floor;
+  using std::pow;
+  std::array<GridAxis<Real>, 3> axes;
+  const int dimension = surroundings.planar() ? 2 : 3;
+  std::array<Real, 3> low{};
+  std::array<Real, 3> length{};
+  Real volume = 1;
+  for (int k = 0; k < 3; ++k) {
+    GridAxis<Real>& axis = axes[static_cast<std::size_t>(k)];
+    axis.flat = k >= dimension;
+    if (axis.flat) continue;
+    Real high = 0;
+    detail::extent(surroundings, balls, k, low[static_cast<std::size_t>(k)], high);
+    length[static_cast<std::size_t>(k)] = high - low[static_cast<std::size_t>(k)];
+    volume *= length[static_cast<std::size_t>(k)];
+    axis.periodic = surroundings.periodic;
+    axis.lower_wall = !axis.periodic && std::isfinite(surroundings.box.min[k]);
+    axis.upper_wall = !axis.periodic && std::isfinite(surroundings.box.max[k]);
+  }
+
+  // The coarsest cells take the largest balls, and are no finer than the balls are many.
+  Real edge = 0;
+  for (const GridBall<Real>& ball : balls) {
+    edge = std::max(edge, Real(2 * ball.radius * Real(kCellMargin)));
+  }
+  const Real roomiest = Real(balls.size()) / Real(kBallsPerCell) + 1;  // cells
+  edge = std::max(edge, pow(volume / roomiest, 1 / Real(dimension)));
+  if (!(edge > 0)) edge = 1;
+  const auto cut = [&](std::size_t k) { return std::max(Real(1), floor(length[k] / edge)); };
+  while (cut(0) * cut(1) * (dimension == 3 ? cut(2) : Real(1)) > 2 * roomiest) edge *= Real(1.25);
+
+  for (std::size_t k = 0; k < 3; ++k) {
+    GridAxis<Real>& axis = axes[k];
+    if (axis.flat) continue;
+    axis.cells = static_cast<std::uint32_t>(cut(k));
+    axis.length = length[k];
+    axis.origin = low[k];
+    if (!axis.open()) {
+      axis.edge = length[k] / Real(axis.cells);
+      continue;
+    }
+    std::uint32_t power = 1;
+    while (power < axis.cells) power *= 2;
+    axis.cells = power;
+    axis.edge = edge;
+    if (axis.upper_wall) axis.origin = low[k] + length[k] - Real(axis.cells) * edge;
+  }
+
+  // Finer levels, for balls at most half as wide, where enough of them share the finest cells.
+  Real shortest = kNever<Real>;
+  for (const GridAxis<Real>& axis : axes) {
+    if (!axis.flat) shortest = std::min(shortest, axis.edge);
+  }
+  std::vector<int> depths = {0};
+  std::vector<std::size_t> at_depth(32, 0);
+  for (const GridBall<Real>& ball : balls) {
+    const Real ratio = shortest / (2 * ball.radius * Real(kCellMargin));
+    int depth = 0;
+    while (depth < 31 && ratio >= Real(std::uint32_t{2} << depth)) ++depth;
+    ++at_depth[static_cast<std::size_t>(depth)];
+  }
+  std::size_t finer = 0;
+  for (int depth = 31; depth > 0; --depth) {
+    finer += at_depth[static_cast<std::size_t>(depth)];
+    Real cells = 1;
+    for (const GridAxis<Real>& axis : axes) {
+      if (!axis.flat) cells *= Real(axis.cells) * Real(std::uint32_t{1} << depth);
+    }
+    if (finer > 0 && cells <= 4 * Real(finer) + 64) {
+      depths.push_back(depth);
+      finer = 0;
+    }
+  }
+  std::sort(depths.begin(), depths.end());
+  return CellGrid<Real>(axes, depths);
+}
+
+}  // namespace ball_sim
