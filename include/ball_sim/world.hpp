@@ -10,47 +10,15 @@
 #include <limits>
 #include <memory>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "ball_sim/method.hpp"
 #include "ball_sim/methods.hpp"
+#include "ball_sim/refusal.hpp"
 #include "ball_sim/scene.hpp"
 
 namespace ball_sim {
-
-/// Why something was refused. The numbers are part of the ROS interface: append only.
-enum class RefusalCode : std::uint8_t {
-  none = 0,
-  not_finite = 1,    ///< NaN or infinity where a number is needed
-  out_of_range = 2,  ///< finite, but not allowed (zero radius, ...)
-  outside = 3,       ///< beyond a wall
-  overlap = 4,       ///< into another ball
-  ball_limit = 5,    ///< more balls than max_balls
-  unknown_ball = 6,  ///< no ball with that id
-  fixed_ball = 7,    ///< a ball of infinite mass cannot be moved
-  not_planar = 8,    ///< out of the plane of a planar scene
-  rejected_with_others = 9,  ///< fine by itself, but another of the same request was refused
-};
-
-struct Refusal {
-  RefusalCode code = RefusalCode::none;  ///< none: accepted
-  std::string reason;                    ///< names the thing, the value and the rule
-
-  explicit operator bool() const { return code != RefusalCode::none; }
-};
-
-/// A request on the world that was refused; the world is as it was.
-class Refused : public std::runtime_error {
- public:
-  explicit Refused(const Refusal& refusal)
-      : std::runtime_error(refusal.reason), code_(refusal.code) {}
-  RefusalCode code() const { return code_; }
-
- private:
-  RefusalCode code_;
-};
 
 /// What became of a request to add balls: all of them, or none.
 struct SpawnResult {
@@ -70,7 +38,8 @@ struct WorldOptions {
 class World {
  public:
   /// Fills the scene and sets the clock to 0.
-  /// @throws PackingError, std::invalid_argument (method), Refused (a listed ball, named by index)
+  /// @throws PackingError, std::invalid_argument (method, time step), Refused (a listed ball, named
+  /// by index; more balls than max_balls)
   explicit World(const Scene& scene, const WorldOptions& options = {});
 
   // --- time
@@ -81,9 +50,8 @@ class World {
   /// @param target      not before now()
   /// @param max_events  stops early after this many events
   /// @return true when `target` was reached; false: call again to go on
-  /// @throws std::invalid_argument  `target` in the past
-  bool advanceTo(Time target,
-                 std::uint64_t max_events = std::numeric_limits<std::uint64_t>::max());
+  /// @throws std::invalid_argument  `target` in the past, or beyond kMaxTime
+  bool advanceTo(Time target, std::uint64_t max_events = std::numeric_limits<std::uint64_t>::max());
 
   // --- balls: read
 
@@ -92,12 +60,12 @@ class World {
   const std::vector<double>& radii() const { return radii_; }    ///< m, in the order of ids()
   const std::vector<double>& masses() const { return masses_; }  ///< kg, in the order of ids()
   bool contains(BallId id) const;
-  Ball ball(BallId id) const;                                    ///< @throws Refused unknown id
+  Ball ball(BallId id) const;  ///< @throws Refused unknown id
   void read(BallStates& states) const { method_->read(states); }
 
   // --- balls: change, at now()
 
-  /// Adds all the balls or none.
+  /// Adds all the balls or none. In a periodic box a place outside is wrapped to the inside.
   SpawnResult spawn(const std::vector<Ball>& balls);
 
   /// Adds one. @throws Refused
@@ -110,18 +78,20 @@ class World {
   /// Takes out what was added since the scene was loaded.
   void removeSpawned();
 
-  /// @param impulse N s. @return the velocity before and after, m/s. @throws Refused
   struct VelocityChange {
-    Vector3 before;
-    Vector3 after;
+    Vector3 before;  ///< m/s
+    Vector3 after;   ///< m/s
   };
+
+  /// @param impulse N s. @return the velocity before and after, m/s. @throws Refused
   VelocityChange applyImpulse(BallId id, const Vector3& impulse);
 
   /// Puts a ball elsewhere (checked as for spawn) and sets its velocity. @throws Refused
   void setMotion(BallId id, const Vector3& position, const Vector3& velocity);
 
   /// Everything as the scene has it, ids included; time goes on from now(), or begins at 0 again.
-  /// Statistics begin again.
+  /// Statistics begin again. When time goes on, a ball spawned later never gets an id that was in
+  /// use before; when it begins again, so do the ids: it is a new run.
   void reset(bool restart_time);
 
   // --- what it is, and how it goes
@@ -139,7 +109,10 @@ class World {
 
  private:
   std::size_t indexOf(BallId id) const;  // throws Refused
+  // What checkBall says, then overlap with a ball of the world other than `itself`.
   Refusal check(const Ball& ball, std::optional<BallId> itself) const;
+  void add(BallId id, const Ball& ball);
+  void takeOut(const std::vector<BallId>& ids);
   void build(Time start);
 
   Scene scene_;
