@@ -12,6 +12,7 @@
 // place.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -36,9 +37,48 @@ struct AxisNeighbours {
 
   std::array<std::uint32_t, 3> cell = {kNone, kNone, kNone};  ///< part of the cell's index
   std::array<Image, 3> image = {0, 0, 0};                     ///< digit of the image, in place
+  std::uint8_t begin = 1;                                     ///< first that is not kNone
+  std::uint8_t end = 2;                                       ///< behind the last
+  bool wraps = false;                                         ///< some image is not at home
 };
 
-/// One level of cells, and the lists of balls in them.
+/// The balls found near a ball, with the image each was found in.
+struct Candidates {
+  std::vector<Slot> slots;
+  std::vector<Image> images;
+  std::size_t count = 0;
+  bool wraps = false;  ///< some image is not kHomeImage
+
+  void clear() {
+    count = 0;
+    wraps = false;
+  }
+
+  /// Makes room for `more` beyond `count`.
+  void reserve(std::size_t more) {
+    if (slots.size() >= count + more) return;
+    slots.resize(2 * (count + more));
+    images.resize(2 * (count + more));
+  }
+
+  void add(Slot slot, Image image) {
+    reserve(1);
+    slots[count] = slot;
+    images[count++] = image;
+  }
+};
+
+/// The balls in one cell: the first few beside each other, so that they are copied without a
+/// branch on how many there are.
+struct alignas(16) Cell {
+  static constexpr std::uint32_t kInPlace = 3;
+
+  /// Beyond three balls the last of these is the head of a chain that holds the third and later.
+  std::array<Slot, kInPlace> slots = {kNoSlot, kNoSlot, kNoSlot};
+  std::uint32_t count = 0;
+};
+
+/// One level of cells, and who is in them.
 class CellLevel {
  public:
   /// @param depth  times the coarsest edges are halved
@@ -54,7 +94,7 @@ class CellLevel {
       stride *= counts[axis];
       digit *= 3;
     }
-    members_.assign(stride, kNoSlot);
+    cells_.resize(stride);
   }
 
   int depth() const { return depth_; }
@@ -69,34 +109,91 @@ class CellLevel {
     return neighbours_[axis][static_cast<std::size_t>(coordinate & mask_[axis])];
   }
 
-  Slot firstMember(std::uint32_t cell) const { return members_[cell]; }
-  Slot firstGuest(std::uint32_t cell) const { return guests_[cell]; }
-  Slot next(Slot slot) const { return next_[slot]; }
+  void expectGuests() { guests_.assign(cells_.size(), kNoSlot); }
   bool hasGuests() const { return !guests_.empty(); }
 
-  void expectGuests() { guests_.assign(members_.size(), kNoSlot); }
-  void resize(std::size_t slots) { next_.resize(slots, kNoSlot); }
-
-  void link(Slot slot, std::uint32_t cell, bool as_guest) {
-    Slot& head = (as_guest ? guests_ : members_)[cell];
-    next_[slot] = head;
-    head = slot;
+  void resize(std::size_t slots) {
+    next_.resize(slots, kNoSlot);
+    if (hasGuests()) previous_.resize(slots, kNoSlot);
   }
 
-  void unlink(Slot slot, std::uint32_t cell, bool as_guest) {
-    Slot* link = &(as_guest ? guests_ : members_)[cell];
-    while (*link != slot) link = &next_[*link];
-    *link = next_[slot];
+  void link(Slot slot, std::uint32_t index) {
+    Cell& cell = cells_[index];
+    if (cell.count < Cell::kInPlace) {
+      cell.slots[cell.count] = slot;
+      next_[slot] = kNoSlot;
+    } else {
+      next_[slot] = cell.slots[2];
+      cell.slots[2] = slot;
+    }
+    ++cell.count;
+  }
+
+  void unlink(Slot slot, std::uint32_t index) {
+    Cell& cell = cells_[index];
+    const std::uint32_t last = std::min(cell.count, Cell::kInPlace) - 1;
+    std::uint32_t i = 0;
+    while (i < 2 && cell.slots[i] != slot) ++i;
+    if (i < 2) {
+      cell.slots[i] = cell.slots[last];  // the gap takes the last, or the chain's head
+      dropLast(cell, last);
+    } else {
+      Slot* at = &cell.slots[2];
+      while (*at != slot) at = &next_[*at];
+      *at = next_[slot];
+    }
+    --cell.count;
+  }
+
+  void linkGuest(Slot slot, std::uint32_t index) {
+    const Slot head = guests_[index];
+    next_[slot] = head;
+    previous_[slot] = kNoSlot;
+    if (head != kNoSlot) previous_[head] = slot;
+    guests_[index] = slot;
+  }
+
+  void unlinkGuest(Slot slot, std::uint32_t index) {
+    const Slot after = next_[slot];
+    const Slot before = previous_[slot];
+    if (after != kNoSlot) previous_[after] = before;
+    (before != kNoSlot ? next_[before] : guests_[index]) = after;
+  }
+
+  /// Adds the members of a cell. Needs room for three beyond candidates.count.
+  void gather(std::uint32_t index, Image image, Candidates& candidates) const {
+    const Cell& cell = cells_[index];
+    for (std::size_t i = 0; i < Cell::kInPlace; ++i) {
+      candidates.slots[candidates.count + i] = cell.slots[i];
+      candidates.images[candidates.count + i] = image;
+    }
+    if (cell.count <= Cell::kInPlace) {
+      candidates.count += cell.count;
+    } else {
+      candidates.count += Cell::kInPlace;
+      for (Slot s = next_[cell.slots[2]]; s != kNoSlot; s = next_[s]) candidates.add(s, image);
+      candidates.reserve(27 * Cell::kInPlace);
+    }
+  }
+
+  void gatherGuests(std::uint32_t index, Image image, Candidates& candidates) const {
+    for (Slot s = guests_[index]; s != kNoSlot; s = next_[s]) candidates.add(s, image);
+    candidates.reserve(27 * Cell::kInPlace);
   }
 
   std::size_t bytes() const {
     std::size_t bytes =
-        (members_.capacity() + guests_.capacity() + next_.capacity()) * sizeof(Slot);
+        cells_.capacity() * sizeof(Cell) +
+        (guests_.capacity() + next_.capacity() + previous_.capacity()) * sizeof(Slot);
     for (const auto& axis : neighbours_) bytes += axis.capacity() * sizeof(AxisNeighbours);
     return bytes;
   }
 
  private:
+  void dropLast(Cell& cell, std::uint32_t last) {
+    cell.slots[last] = last == 2 ? next_[cell.slots[2]] : kNoSlot;
+  }
+
   static std::vector<AxisNeighbours> axisNeighbours(std::uint32_t count, bool periodic, bool open,
                                                     std::uint32_t stride, Image digit) {
     std::vector<AxisNeighbours> table(count);
@@ -104,16 +201,15 @@ class CellLevel {
       AxisNeighbours& near = table[c];
       near.cell[1] = c * stride;
       near.image = {digit, digit, digit};
-      const bool wraps = periodic || open;
       // On an open axis of one or two cells the neighbours are cells already listed.
-      if (c > 0 || (wraps && (periodic || count > 2))) {
-        near.cell[0] = (c > 0 ? c - 1 : count - 1) * stride;
-      }
-      if (c + 1 < count || (wraps && (periodic || count > 2))) {
-        near.cell[2] = (c + 1 < count ? c + 1 : 0) * stride;
-      }
+      const bool wraps = periodic || (open && count > 2);
+      if (c > 0 || wraps) near.cell[0] = (c > 0 ? c - 1 : count - 1) * stride;
+      if (c + 1 < count || wraps) near.cell[2] = (c + 1 < count ? c + 1 : 0) * stride;
+      near.begin = near.cell[0] == AxisNeighbours::kNone ? 1 : 0;
+      near.end = near.cell[2] == AxisNeighbours::kNone ? 2 : 3;
       if (periodic && c == 0) near.image[0] = 0;
       if (periodic && c + 1 == count) near.image[2] = 2 * digit;
+      near.wraps = periodic && (c == 0 || c + 1 == count);
     }
     return table;
   }
@@ -121,9 +217,10 @@ class CellLevel {
   int depth_;
   std::array<std::int32_t, 3> mask_{};  // of coordinates on open axes; all ones elsewhere
   std::array<std::vector<AxisNeighbours>, 3> neighbours_;
-  std::vector<Slot> members_;  // first ball of each cell's list
-  std::vector<Slot> guests_;   // the same for balls of finer levels; empty when there are none
-  std::vector<Slot> next_;     // a ball is in one list of a level
+  std::vector<Cell> cells_;     // members
+  std::vector<Slot> guests_;    // heads of the lists of balls of finer levels; empty without any
+  std::vector<Slot> next_;      // in a cell's chain, or a list of guests
+  std::vector<Slot> previous_;  // in a list of guests
 };
 
 /// How one axis is cut.
@@ -158,38 +255,41 @@ class CellGrid {
       levels_.emplace_back(depth, counts, periodic, open);
     }
     for (std::size_t i = 0; i + 1 < levels_.size(); ++i) levels_[i].expectGuests();
+    for (const CellLevel& level : levels_) {
+      using std::ldexp;
+      edges_.push_back({ldexp(axes[0].edge, -level.depth()), ldexp(axes[1].edge, -level.depth()),
+                        ldexp(axes[2].edge, -level.depth())});
+    }
   }
 
   const GridAxis<Real>& axis(std::size_t k) const { return axes_[k]; }
   std::vector<CellLevel>& levels() { return levels_; }
   const std::vector<CellLevel>& levels() const { return levels_; }
 
-  Real edge(std::size_t axis, int depth) const {
-    using std::ldexp;
-    return ldexp(axes_[axis].edge, -depth);
-  }
+  /// Edge of a cell, m.
+  Real edge(std::size_t axis, std::size_t level) const { return edges_[level][axis]; }
 
   /// Number of cells from end to end of a bounded axis.
-  std::int32_t count(std::size_t axis, int depth) const {
-    return static_cast<std::int32_t>(axes_[axis].cells << depth);
+  std::int32_t count(std::size_t axis, std::size_t level) const {
+    return static_cast<std::int32_t>(axes_[axis].cells << levels_[level].depth());
   }
 
-  CellCoordinates coordinatesOf(const VectorOf<Real>& x, int depth) const {
+  CellCoordinates coordinatesOf(const VectorOf<Real>& x, std::size_t level) const {
     using std::floor;
     CellCoordinates c{};
     for (std::size_t k = 0; k < 3; ++k) {
       if (axes_[k].flat) continue;
-      const Real cell = floor((x[static_cast<int>(k)] - axes_[k].origin) / edge(k, depth));
+      const Real cell = floor((x[static_cast<int>(k)] - axes_[k].origin) / edge(k, level));
       c[k] = static_cast<std::int32_t>(cell);
       if (axes_[k].lower_wall || axes_[k].periodic) c[k] = std::max(c[k], 0);
-      if (axes_[k].upper_wall || axes_[k].periodic) c[k] = std::min(c[k], count(k, depth) - 1);
+      if (axes_[k].upper_wall || axes_[k].periodic) c[k] = std::min(c[k], count(k, level) - 1);
     }
     return c;
   }
 
-  /// The same cell in the coordinates of a coarser level.
-  static CellCoordinates coarser(const CellCoordinates& c, int depth, int coarser_depth) {
-    const int shift = depth - coarser_depth;
+  /// The same cell of `level` in the coordinates of a coarser one.
+  CellCoordinates coarser(const CellCoordinates& c, std::size_t level, std::size_t coarse) const {
+    const int shift = levels_[level].depth() - levels_[coarse].depth();
     return {c[0] >> shift, c[1] >> shift, c[2] >> shift};
   }
 
@@ -199,40 +299,53 @@ class CellGrid {
 
   /// Puts a ball into its level and, as a guest, into all coarser ones.
   void link(Slot slot, const CellCoordinates& coordinates, std::size_t level) {
-    const int depth = levels_[level].depth();
-    for (std::size_t m = 0; m <= level; ++m) {
-      const auto c = coarser(coordinates, depth, levels_[m].depth());
-      levels_[m].link(slot, levels_[m].cellIndex(c), m != level);
+    levels_[level].link(slot, levels_[level].cellIndex(coordinates));
+    for (std::size_t m = 0; m < level; ++m) {
+      levels_[m].linkGuest(slot, levels_[m].cellIndex(coarser(coordinates, level, m)));
     }
   }
 
   void unlink(Slot slot, const CellCoordinates& coordinates, std::size_t level) {
-    const int depth = levels_[level].depth();
-    for (std::size_t m = 0; m <= level; ++m) {
-      const auto c = coarser(coordinates, depth, levels_[m].depth());
-      levels_[m].unlink(slot, levels_[m].cellIndex(c), m != level);
+    levels_[level].unlink(slot, levels_[level].cellIndex(coordinates));
+    for (std::size_t m = 0; m < level; ++m) {
+      levels_[m].unlinkGuest(slot, levels_[m].cellIndex(coarser(coordinates, level, m)));
     }
   }
 
-  /// Calls visit(slot, image) for all balls that can touch one at these coordinates of `level`
-  /// before anyone crosses, itself included.
-  template <class Visit>
-  void visitNear(const CellCoordinates& coordinates, std::size_t level, Visit visit) const {
-    visitLayer(coordinates, level, -1, 0, visit);
+  /// Moves a ball to an adjacent cell of its level.
+  void move(Slot slot, const CellCoordinates& from, const CellCoordinates& to, std::size_t level) {
+    levels_[level].unlink(slot, levels_[level].cellIndex(from));
+    levels_[level].link(slot, levels_[level].cellIndex(to));
+    for (std::size_t m = 0; m < level; ++m) {
+      const std::uint32_t before = levels_[m].cellIndex(coarser(from, level, m));
+      const std::uint32_t after = levels_[m].cellIndex(coarser(to, level, m));
+      if (before == after) continue;
+      levels_[m].unlinkGuest(slot, before);
+      levels_[m].linkGuest(slot, after);
+    }
+  }
+
+  /// Finds all balls that can touch one at these coordinates of `level` before anyone crosses,
+  /// itself included.
+  void gatherNear(const CellCoordinates& coordinates, std::size_t level,
+                  Candidates& candidates) const {
+    candidates.clear();
+    for (std::size_t m = 0; m <= level; ++m) {
+      gatherCells(levels_[m], coarser(coordinates, level, m), kAllAround, 0, m == level,
+                  candidates);
+    }
   }
 
   /// The same, but only the layer of cells that came near by a crossing along `axis` towards
   /// `direction` (0 lower, 2 upper), on the levels where cells were crossed at all.
-  template <class Visit>
-  void visitNewLayer(const CellCoordinates& before, const CellCoordinates& after, std::size_t level,
-                     int axis, std::size_t direction, Visit visit) const {
-    const auto k = static_cast<std::size_t>(axis);
-    const int depth = levels_[level].depth();
+  void gatherNewLayer(const CellCoordinates& before, const CellCoordinates& after,
+                      std::size_t level, std::size_t axis, std::size_t direction,
+                      Candidates& candidates) const {
+    candidates.clear();
     for (std::size_t m = 0; m <= level; ++m) {
-      const int shift = depth - levels_[m].depth();
-      if (before[k] >> shift == after[k] >> shift) continue;
-      visitCells(levels_[m], coarser(after, depth, levels_[m].depth()), axis, direction, m == level,
-                 visit);
+      const CellCoordinates c = coarser(after, level, m);
+      if (c[axis] == coarser(before, level, m)[axis]) continue;
+      gatherCells(levels_[m], c, axis, direction, m == level, candidates);
     }
   }
 
@@ -243,46 +356,40 @@ class CellGrid {
   }
 
  private:
-  template <class Visit>
-  void visitLayer(const CellCoordinates& coordinates, std::size_t level, int axis,
-                  std::size_t direction, Visit visit) const {
-    const int depth = levels_[level].depth();
-    for (std::size_t m = 0; m <= level; ++m) {
-      visitCells(levels_[m], coarser(coordinates, depth, levels_[m].depth()), axis, direction,
-                 m == level, visit);
-    }
-  }
+  static constexpr std::size_t kAllAround = 3;  // no axis
 
   // The 27 cells around `c`, or of them only the layer at `direction` of `axis`.
-  template <class Visit>
-  static void visitCells(const CellLevel& level, const CellCoordinates& c, int axis,
-                         std::size_t direction, bool own, Visit visit) {
-    const AxisNeighbours& x = level.neighbours(0, c[0]);
-    const AxisNeighbours& y = level.neighbours(1, c[1]);
-    const AxisNeighbours& z = level.neighbours(2, c[2]);
-    const auto from = [&](int k) { return k == axis ? direction : std::size_t{0}; };
-    const auto to = [&](int k) { return k == axis ? direction : std::size_t{2}; };
+  static void gatherCells(const CellLevel& level, const CellCoordinates& c, std::size_t axis,
+                          std::size_t direction, bool own, Candidates& candidates) {
+    std::array<const AxisNeighbours*, 3> near{};
+    std::array<std::size_t, 3> from{};
+    std::array<std::size_t, 3> to{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      near[k] = &level.neighbours(k, c[k]);
+      from[k] = k == axis ? direction : near[k]->begin;
+      to[k] = k == axis ? direction + 1 : near[k]->end;
+      if (k == axis && near[k]->cell[direction] == AxisNeighbours::kNone) return;
+      candidates.wraps = candidates.wraps || near[k]->wraps;
+    }
     const bool guests = own && level.hasGuests();
-    for (std::size_t k = from(2); k <= to(2); ++k) {
-      if (z.cell[k] == AxisNeighbours::kNone) continue;
-      for (std::size_t j = from(1); j <= to(1); ++j) {
-        if (y.cell[j] == AxisNeighbours::kNone) continue;
-        const std::uint32_t row = z.cell[k] + y.cell[j];
-        const Image row_image = z.image[k] + y.image[j];
-        for (std::size_t i = from(0); i <= to(0); ++i) {
-          if (x.cell[i] == AxisNeighbours::kNone) continue;
-          const std::uint32_t cell = row + x.cell[i];
-          const Image image = row_image + x.image[i];
-          for (Slot s = level.firstMember(cell); s != kNoSlot; s = level.next(s)) visit(s, image);
-          if (!guests) continue;
-          for (Slot s = level.firstGuest(cell); s != kNoSlot; s = level.next(s)) visit(s, image);
+    candidates.reserve(27 * Cell::kInPlace);
+    for (std::size_t k = from[2]; k < to[2]; ++k) {
+      for (std::size_t j = from[1]; j < to[1]; ++j) {
+        const std::uint32_t row = near[2]->cell[k] + near[1]->cell[j];
+        const Image row_image = near[2]->image[k] + near[1]->image[j];
+        for (std::size_t i = from[0]; i < to[0]; ++i) {
+          level.gather(row + near[0]->cell[i], row_image + near[0]->image[i], candidates);
+          if (guests) {
+            level.gatherGuests(row + near[0]->cell[i], row_image + near[0]->image[i], candidates);
+          }
         }
       }
     }
   }
 
   std::array<GridAxis<Real>, 3> axes_;
-  std::vector<CellLevel> levels_;  // coarsest first
+  std::vector<CellLevel> levels_;           // coarsest first
+  std::vector<std::array<Real, 3>> edges_;  // m, by level and axis
 };
 
 }  // namespace ball_sim

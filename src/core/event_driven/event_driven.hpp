@@ -31,6 +31,7 @@
 #include "event_driven/cell_grid.hpp"
 #include "event_driven/event_queue.hpp"
 #include "event_driven/grid_layout.hpp"
+#include "event_driven/pair_batch.hpp"
 
 namespace ball_sim {
 
@@ -456,7 +457,7 @@ class EventDriven final : public Method {
     Agenda& agenda = agendas_[slot];
     bringHome(slot);
     agenda.level = levelOf(bodies_[slot].radius);
-    agenda.cell = grid_.coordinatesOf(positionNow(slot), grid_.levels()[agenda.level].depth());
+    agenda.cell = grid_.coordinatesOf(positionNow(slot), agenda.level);
     grid_.link(slot, agenda.cell, agenda.level);
   }
 
@@ -485,10 +486,9 @@ class EventDriven final : public Method {
     const int axis = agenda.crossing_axis;
     const auto k = static_cast<std::size_t>(axis);
     const CellCoordinates before = agenda.cell;
-    grid_.unlink(slot, before, agenda.level);
     agenda.cell[k] += agenda.crossing_direction;
     if (period_[axis] > 0) {
-      const std::int32_t count = grid_.count(k, grid_.levels()[agenda.level].depth());
+      const std::int32_t count = grid_.count(k, agenda.level);
       if (agenda.cell[k] < 0) {
         agenda.cell[k] = count - 1;
         bodies_[slot].x[axis] += period_[axis];
@@ -499,15 +499,12 @@ class EventDriven final : public Method {
     } else if (agenda.cell[k] > kFarthestCell || agenda.cell[k] < -kFarthestCell) {
       throw std::range_error("ball " + std::to_string(ids_[slot]) + " has flown 2^30 cells away");
     }
-    grid_.link(slot, agenda.cell, agenda.level);
-    candidates_.clear();
-    grid_.visitNewLayer(before, agenda.cell, agenda.level, axis,
-                        agenda.crossing_direction > 0 ? 2 : 0, [&](Slot other, Image image) {
-                          candidates_.push_back({other, image});
-                        });
+    grid_.move(slot, before, agenda.cell, agenda.level);
     Found found{agenda.impact_time, agenda.partner};
     const Real old_time = found.time;
-    considerBalls(slot, kNoSlot, found);
+    grid_.gatherNewLayer(before, agenda.cell, agenda.level, k,
+                         agenda.crossing_direction > 0 ? 2 : 0, candidates_);
+    considerCandidates(seekerAt(slot, kNoSlot), found);
     considerWallsOf(slot, found);
     if (found.time < old_time) setImpact(slot, found);
     findCrossing(slot);
@@ -607,12 +604,9 @@ class EventDriven final : public Method {
 
   void findNextEvent(Slot slot, Slot just_met) {
     const Agenda& agenda = agendas_[slot];
-    candidates_.clear();
-    grid_.visitNear(agenda.cell, agenda.level, [&](Slot other, Image image) {
-      candidates_.push_back({other, image});
-    });
     Found found;
-    considerBalls(slot, just_met, found);
+    grid_.gatherNear(agenda.cell, agenda.level, candidates_);
+    considerCandidates(seekerAt(slot, just_met), found);
     considerWallsOf(slot, found);
     setImpact(slot, found);
     findCrossing(slot);
@@ -626,32 +620,82 @@ class EventDriven final : public Method {
         found.partner < kWall && found.time < kNever<Real> ? agendas_[found.partner].version : 0;
   }
 
-  void considerBalls(Slot slot, Slot just_met, Found& found) const {
-    const Vec x = positionNow(slot);
-    const Vec v = velocityNow(slot);
-    const Real radius = bodies_[slot].radius;
-    for (const Candidate& candidate : candidates_) {
-      const Slot other = candidate.slot;
-      if (other == slot) continue;
-      Vec dx = positionNow(other) - x;
-      if (candidate.image != kHomeImage) dx += image_shift_[candidate.image];
-      const Vec dv = velocityNow(other) - v;
-      const Real reach = bodies_[other].radius + radius;
-      // In straight relative motion two balls that have just met do not meet again.
-      const bool met = other == just_met && dot(dx, dx) < reach * reach * Real(1 + 1e-6);
-      const Real time = now_ + timeToBall(slot, other, dx, dv, reach, met);
-      if (time < found.time || (time == found.time && isEarlierTie(other, found))) {
-        found = {time, other};
+  // One ball, as it is now, in search of its next impact.
+  struct Seeker {
+    Slot slot;
+    Slot just_met;
+    Vec x;        // m
+    Vec v;        // m/s
+    Real radius;  // m
+  };
+
+  Seeker seekerAt(Slot slot, Slot just_met) const {
+    return {slot, just_met, positionNow(slot), velocityNow(slot), bodies_[slot].radius};
+  }
+
+  // Takes the earliest impact with any of the candidates, if it is earlier than `found`.
+  void considerCandidates(const Seeker& seeker, Found& found) {
+    for (std::size_t first = 0; first < candidates_.count; first += batch_.kCapacity) {
+      const std::size_t last = std::min(candidates_.count, first + batch_.kCapacity);
+      for (std::size_t i = first; i < last; ++i) {
+        const Slot other = candidates_.slots[i];
+        const Image image = candidates_.wraps ? candidates_.images[i] : kHomeImage;
+        if (kGravity ? setFalling(seeker, other, image, found) : setFlying(other, image)) {
+          const bool counts =
+              other != seeker.slot && !(other == seeker.just_met && touches(seeker, batch_.count));
+          batch_slots_[batch_.count] = other;
+          batch_.count += counts ? 1 : 0;
+        }
       }
+      takeEarliest(seeker, found);
     }
   }
 
-  Real timeToBall(Slot slot, Slot other, const Vec& dx, const Vec& dv, Real reach, bool met) const {
-    if constexpr (kGravity) {
-      const Vec da = accelerations_[other] - accelerations_[slot];
-      if (dot(da, da) > 0) return timeOfImpactAccelerated<Real>(dx, dv, da, reach);
+  // Puts a ball into the batch's next lane, at its own time.
+  bool setFlying(Slot other, Image image) {
+    const Body& body = bodies_[other];
+    batch_.set(batch_.count, body.x, body.v, body.time, body.radius);
+    if (image != kHomeImage) batch_.shift(batch_.count, image_shift_[image]);
+    return true;
+  }
+
+  // The same for balls that fall; false if they fall differently, which is settled at once.
+  bool setFalling(const Seeker& seeker, Slot other, Image image, Found& found) {
+    Vec x = positionNow(other);
+    if (image != kHomeImage) x += image_shift_[image];
+    const Vec v = velocityNow(other);
+    const Vec da = accelerations_[other] - accelerations_[seeker.slot];
+    if (dot(da, da) > 0) {
+      const Real reach = bodies_[other].radius + seeker.radius;
+      const Real wait = timeOfImpactAccelerated<Real>(x - seeker.x, v - seeker.v, da, reach);
+      takeIfEarlier(other, now_ + wait, found);
+      return false;
     }
-    return met ? kNever<Real> : timeOfImpact<Real>(dx, dv, reach);
+    batch_.set(batch_.count, x, v, now_, bodies_[other].radius);
+    return true;
+  }
+
+  // In straight relative motion two balls that touch and have just met do not meet again.
+  bool touches(const Seeker& seeker, std::size_t i) const {
+    const Vec dx = batch_.placeAt(i, now_) - seeker.x;
+    const Real reach = batch_.radius[i] + seeker.radius;
+    return dot(dx, dx) < reach * reach * Real(1 + 1e-6);
+  }
+
+  // Empties the batch: its earliest impact, if it is earlier than `found`.
+  void takeEarliest(const Seeker& seeker, Found& found) {
+    findImpacts(batch_, seeker.x.data(), seeker.v.data(), seeker.radius, now_);
+    for (std::size_t i = 0; i < batch_.count; ++i) {
+      const Real time = now_ + batch_.wait[i];
+      if (time <= found.time) takeIfEarlier(batch_slots_[i], time, found);
+    }
+    batch_.count = 0;
+  }
+
+  void takeIfEarlier(Slot other, Real time, Found& found) const {
+    if (time < found.time || (time == found.time && isEarlierTie(other, found))) {
+      found = {time, other};
+    }
   }
 
   bool isEarlierTie(Slot other, const Found& found) const {
@@ -662,13 +706,12 @@ class EventDriven final : public Method {
   void considerWallsOf(Slot slot, Found& found) const {
     if (walls_.empty() || isFixed(slot)) return;
     const Agenda& agenda = agendas_[slot];
-    const int depth = grid_.levels()[agenda.level].depth();
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const GridAxis<Real>& grid_axis = grid_.axis(axis);
       if (grid_axis.lower_wall && agenda.cell[axis] == 0) {
         considerWall(slot, face_walls_[2 * axis], found);
       }
-      if (grid_axis.upper_wall && agenda.cell[axis] == grid_.count(axis, depth) - 1) {
+      if (grid_axis.upper_wall && agenda.cell[axis] == grid_.count(axis, agenda.level) - 1) {
         considerWall(slot, face_walls_[2 * axis + 1], found);
       }
     }
@@ -696,12 +739,11 @@ class EventDriven final : public Method {
     if (isFixed(slot)) return;
     const Vec x = positionNow(slot);
     const Vec v = velocityNow(slot);
-    const int depth = grid_.levels()[agenda.level].depth();
     for (std::size_t k = 0; k < 3; ++k) {
       const GridAxis<Real>& axis = grid_.axis(k);
       if (axis.flat) continue;
       const int i = static_cast<int>(k);
-      const Real edge = grid_.edge(k, depth);
+      const Real edge = grid_.edge(k, agenda.level);
       const Real lower = x[i] - (axis.origin + Real(agenda.cell[k]) * edge);
       const Real upper = (axis.origin + Real(agenda.cell[k] + 1) * edge) - x[i];
       Real a = 0;
@@ -713,10 +755,9 @@ class EventDriven final : public Method {
 
   void considerCrossing(Agenda& agenda, Real dt, std::size_t axis, int direction) const {
     const GridAxis<Real>& grid_axis = grid_.axis(axis);
-    const int depth = grid_.levels()[agenda.level].depth();
     if (direction < 0 && grid_axis.lower_wall && agenda.cell[axis] == 0) return;
     if (direction > 0 && grid_axis.upper_wall &&
-        agenda.cell[axis] == grid_.count(axis, depth) - 1) {
+        agenda.cell[axis] == grid_.count(axis, agenda.level) - 1) {
       return;
     }
     if (now_ + dt < agenda.crossing_time) {
@@ -744,11 +785,6 @@ class EventDriven final : public Method {
     collision.approach_speed = double(speed);
     log_->add(collision);
   }
-
-  struct Candidate {
-    Slot slot;
-    Image image;
-  };
 
   static constexpr Real kEventsPerBucket = 4;
   static constexpr std::int32_t kFarthestCell = 1 << 30;
@@ -779,7 +815,9 @@ class EventDriven final : public Method {
   std::size_t balls_at_layout_ = 0;
   bool ready_ = false;  // grid and queue hold all balls
   EventQueue<Real, EventDriven> queue_;
-  std::vector<Candidate> candidates_;  // scratch of a search
+  Candidates candidates_;  // scratch of a search
+  PairBatch<Real> batch_;  // scratch of a search
+  std::array<Slot, PairBatch<Real>::kCapacity> batch_slots_{};
 
   Time origin_;   // when this year began
   Real now_ = 0;  // s, in this year
