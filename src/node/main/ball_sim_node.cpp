@@ -1,0 +1,60 @@
+// ball_sim_node: a simulation as a ROS node. See the package's README for topics and services.
+#include <ros/console.h>
+#include <ros/init.h>
+#include <ros/node_handle.h>
+
+#include <csignal>
+#include <exception>
+
+#include "ball_sim/scene_reader.hpp"
+#include "ball_sim/world.hpp"
+#include "outputs.hpp"
+#include "parameters.hpp"
+#include "scene_file.hpp"
+#include "services.hpp"
+#include "simulator.hpp"
+
+namespace ball_sim {
+namespace {
+
+World makeWorld(const Parameters& parameters) {
+  Scene scene = readScene(findScene(parameters.scene));
+  if (parameters.seed) {
+    auto seed = static_cast<std::uint64_t>(*parameters.seed);
+    for (Fill& fill : scene.fill) {
+      fill.seed = seed++;
+    }
+  }
+  WorldOptions options;
+  options.method = parameters.method;
+  options.time_step = parameters.time_step;
+  options.max_balls = static_cast<std::size_t>(parameters.max_balls);
+  return World(scene, options);
+}
+
+void run() {
+  ros::NodeHandle node("~");
+  const Parameters parameters = readParameters(node);
+  World world = makeWorld(parameters);
+  ROS_INFO_STREAM("scene " << world.scene().name << ": " << world.size() << " balls, method "
+                           << world.method().name << " (" << world.method().reason << ")");
+  Outputs outputs(node, parameters);
+  Simulator simulator(parameters, world, outputs, [] { return ros::isShuttingDown(); });
+  const Services services(node, simulator, parameters.wall_timeout);
+  simulator.run();
+}
+
+}  // namespace
+}  // namespace ball_sim
+
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "ball_sim");
+  std::signal(SIGTERM, [](int) { ros::requestShutdown(); });
+  try {
+    ball_sim::run();
+  } catch (const std::exception& error) {
+    ROS_FATAL_STREAM(error.what());
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,196 @@
+#include "parameters.hpp"
+
+#include <ros/console.h>
+#include <ros/param.h>
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+#include <sstream>
+#include <vector>
+
+#include "ball_sim/text.hpp"
+
+namespace ball_sim {
+namespace {
+
+std::string join(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) {
+    text += (text.empty() ? "" : ", ") + name;
+  }
+  return text;
+}
+
+std::string describe(const XmlRpc::XmlRpcValue& value) {
+  std::ostringstream text;
+  value.write(text);
+  return text.str();
+}
+
+/// Reads parameters one by one and remembers their names.
+class Reader {
+ public:
+  explicit Reader(const ros::NodeHandle& node) : node_(node) {}
+
+  /// @return nothing when the parameter is not set
+  std::optional<double> number(const std::string& name, double lower, double upper) {
+    return numberWithin(name, lower, upper, false);
+  }
+
+  /// The same, but 0 is allowed beside the range.
+  std::optional<double> numberOrZero(const std::string& name, double lower, double upper) {
+    return numberWithin(name, lower, upper, true);
+  }
+
+  std::optional<int> integer(const std::string& name, int lower, int upper) {
+    auto value = find(name);
+    if (!value) {
+      return std::nullopt;
+    }
+    const bool is_integer = value->getType() == XmlRpc::XmlRpcValue::TypeInt;
+    if (!is_integer || static_cast<int&>(*value) < lower || static_cast<int&>(*value) > upper) {
+      refuse(name, *value,
+             "must be a whole number, " + std::to_string(lower) + " to " + std::to_string(upper));
+    }
+    return static_cast<int&>(*value);
+  }
+
+  std::optional<bool> truth(const std::string& name) {
+    auto value = find(name);
+    if (!value) {
+      return std::nullopt;
+    }
+    if (value->getType() != XmlRpc::XmlRpcValue::TypeBoolean) {
+      refuse(name, *value, "must be true or false");
+    }
+    return static_cast<bool&>(*value);
+  }
+
+  std::optional<std::string> text(const std::string& name) {
+    auto value = find(name);
+    if (!value) {
+      return std::nullopt;
+    }
+    if (value->getType() != XmlRpc::XmlRpcValue::TypeString) {
+      refuse(name, *value, "must be text");
+    }
+    return static_cast<std::string&>(*value);
+  }
+
+  [[noreturn]] static void refuse(const std::string& name, const XmlRpc::XmlRpcValue& value,
+                                  const std::string& rule) {
+    throw ParameterError("parameter ~" + name + ": " + describe(value) + ": " + rule);
+  }
+
+  /// Warns of every private parameter that nobody has asked for.
+  void warnOfUnknown() const {
+    std::vector<std::string> names;
+    ros::param::getParamNames(names);
+    const std::string prefix = node_.getNamespace() + "/";
+    for (const std::string& full_name : names) {
+      if (full_name.compare(0, prefix.size(), prefix) != 0) {
+        continue;
+      }
+      const std::string name = full_name.substr(prefix.size());
+      if (std::find(known_.begin(), known_.end(), name) == known_.end()) {
+        ROS_WARN_STREAM("unknown parameter ~" << name << " is ignored; did you mean ~"
+                                              << nearestName(name, known_) << "?");
+      }
+    }
+  }
+
+ private:
+  std::optional<XmlRpc::XmlRpcValue> find(const std::string& name) {
+    known_.push_back(name);
+    XmlRpc::XmlRpcValue value;
+    return node_.getParam(name, value) ? std::optional<XmlRpc::XmlRpcValue>(value) : std::nullopt;
+  }
+
+  std::optional<double> numberWithin(const std::string& name, double lower, double upper,
+                                     bool zero_too) {
+    auto value = find(name);
+    if (!value) {
+      return std::nullopt;
+    }
+    double number = std::numeric_limits<double>::quiet_NaN();
+    if (value->getType() == XmlRpc::XmlRpcValue::TypeInt) {
+      number = static_cast<int&>(*value);
+    } else if (value->getType() == XmlRpc::XmlRpcValue::TypeDouble) {
+      number = static_cast<double&>(*value);
+    }
+    const bool good = (zero_too && number == 0) || (number >= lower && number <= upper);
+    if (!good) {  // NaN too
+      refuse(name, *value,
+             "must be a number, " + std::string(zero_too ? "0 or " : "") + formatNumber(lower) +
+                 " to " + formatNumber(upper));
+    }
+    return number;
+  }
+
+  ros::NodeHandle node_;
+  std::vector<std::string> known_;
+};
+
+std::size_t editDistance(const std::string& a, const std::string& b) {
+  // row[j]: edits from the letters of `a` so far to the first j letters of `b`.
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({replaced, row[j] + 1, row[j + 1] + 1});
+    }
+  }
+  return row.back();
+}
+
+}  // namespace
+
+const std::string& nearestName(const std::string& name, const std::vector<std::string>& known) {
+  return *std::min_element(known.begin(), known.end(), [&](const auto& a, const auto& b) {
+    return editDistance(name, a) < editDistance(name, b);
+  });
+}
+
+Parameters readParameters(const ros::NodeHandle& private_node) {
+  Reader reader(private_node);
+  Parameters p;
+  p.scene = reader.text("scene").value_or(p.scene);
+  p.method = reader.text("method").value_or(p.method);
+  p.time_step = reader.number("time_step", 1e-9, 1);
+  const int seed = reader.integer("seed", -1, std::numeric_limits<int>::max()).value_or(-1);
+  if (seed >= 0) {
+    p.seed = seed;
+  }
+  p.frame_id = reader.text("frame_id").value_or(p.frame_id);
+  if (p.frame_id.empty()) {
+    Reader::refuse("frame_id", p.frame_id, "must not be empty");
+  }
+  p.real_time_factor =
+      reader.numberOrZero("real_time_factor", 1e-3, 1e3).value_or(p.real_time_factor);
+  p.clock_rate = reader.number("clock_rate", 10, 250).value_or(p.clock_rate);
+  p.state_rate = reader.numberOrZero("state_rate", 1e-3, 1000).value_or(p.state_rate);
+  p.marker_rate = reader.numberOrZero("marker_rate", 0.1, 60).value_or(p.marker_rate);
+  p.publish_clock = reader.truth("publish_clock").value_or(p.publish_clock);
+  p.start_paused = reader.truth("start_paused").value_or(p.start_paused);
+  p.start_time = reader.number("start_time", 1e-9, 4e9).value_or(p.start_time);
+  p.max_balls = reader.integer("max_balls", 1, 10000000).value_or(p.max_balls);
+  p.max_events_per_frame =
+      reader.integer("max_events_per_frame", 1, 1000000000).value_or(p.max_events_per_frame);
+  p.wall_timeout = reader.number("wall_timeout", 0.1, 60).value_or(p.wall_timeout);
+  if (const auto name = reader.text("color_by")) {
+    const auto color_by = colorByName(*name);
+    if (!color_by) {
+      Reader::refuse("color_by", *name, "must be one of " + join(colorByNames()));
+    }
+    p.color_by = *color_by;
+  }
+  reader.warnOfUnknown();
+  return p;
+}
+
+}  // namespace ball_sim

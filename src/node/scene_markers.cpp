@@ -1,0 +1,258 @@
+#include "scene_markers.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "conversions.hpp"
+
+namespace ball_sim {
+namespace {
+
+using visualization_msgs::Marker;
+
+std_msgs::ColorRGBA rgba(float red, float green, float blue, float alpha = 1) {
+  std_msgs::ColorRGBA color;
+  color.r = red;
+  color.g = green;
+  color.b = blue;
+  color.a = alpha;
+  return color;
+}
+
+const std_msgs::ColorRGBA kCloth = rgba(0.06F, 0.58F, 0.34F);
+const std_msgs::ColorRGBA kCushion = rgba(0.05F, 0.50F, 0.29F);
+const std_msgs::ColorRGBA kWood = rgba(0.50F, 0.27F, 0.13F);
+const std_msgs::ColorRGBA kFloor = rgba(0.42F, 0.45F, 0.50F);
+const std_msgs::ColorRGBA kWall = rgba(0.45F, 0.50F, 0.55F, 0.35F);
+const std_msgs::ColorRGBA kEdge = rgba(0.75F, 0.78F, 0.82F);
+
+/// Axis-aligned, finite.
+struct Extent {
+  Vector3 min;
+  Vector3 max;
+
+  Vector3 centre() const { return (min + max) / 2; }
+  Vector3 size() const { return max - min; }
+};
+
+/// What balls and closed faces span.
+Extent extentOf(const Surroundings& surroundings, const BallStates& balls,
+                const std::vector<double>& radii) {
+  Extent extent{Vector3::Constant(std::numeric_limits<double>::infinity()),
+                Vector3::Constant(-std::numeric_limits<double>::infinity())};
+  const auto include = [&](int axis, double value) {
+    extent.min[axis] = std::min(extent.min[axis], value);
+    extent.max[axis] = std::max(extent.max[axis], value);
+  };
+  for (int axis = 0; axis < 3; ++axis) {
+    for (std::size_t i = 0; i < radii.size(); ++i) {
+      include(axis, balls.positions[i][axis] - radii[i]);
+      include(axis, balls.positions[i][axis] + radii[i]);
+    }
+    for (const double face : {surroundings.box.min[axis], surroundings.box.max[axis]}) {
+      if (std::isfinite(face)) {
+        include(axis, face);
+      }
+    }
+    if (!(extent.min[axis] <= extent.max[axis])) {  // nothing there at all
+      include(axis, -1);
+      include(axis, 1);
+    }
+  }
+  return extent;
+}
+
+/// Collects the markers of one scene.
+class Builder {
+ public:
+  Builder(const Surroundings& surroundings, const BallStates& balls,
+          const std::vector<double>& radii, std::string frame_id)
+      : surroundings_(surroundings),
+        extent_(extentOf(surroundings, balls, radii)),
+        frame_id_(std::move(frame_id)) {
+    largest_radius_ = radii.empty() ? 0.05 : *std::max_element(radii.begin(), radii.end());
+  }
+
+  visualization_msgs::MarkerArray build() {
+    if (surroundings_.planar()) {
+      addTable();
+      addCushions();
+    } else {
+      addFloor();
+      addEdges();
+    }
+    for (const Plane& plane : surroundings_.planes) {
+      addPlane(plane);
+    }
+    return std::move(array_);
+  }
+
+ private:
+  Marker& add(int type, const std::string& name, const std_msgs::ColorRGBA& color) {
+    Marker marker;
+    marker.header.frame_id = frame_id_;
+    marker.ns = name;
+    marker.id = static_cast<int>(array_.markers.size());
+    marker.type = type;
+    marker.action = Marker::ADD;
+    marker.pose.orientation.w = 1;
+    marker.color = color;
+    array_.markers.push_back(marker);
+    return array_.markers.back();
+  }
+
+  Marker& addBlock(const std::string& name, const std_msgs::ColorRGBA& color, const Vector3& centre,
+                   const Vector3& size) {
+    Marker& marker = add(Marker::CUBE, name, color);
+    marker.pose.position = toPoint(centre);
+    marker.scale = toVector(size);
+    return marker;
+  }
+
+  bool closed(int axis, bool upper) const {
+    const Box& box = surroundings_.box;
+    return !surroundings_.periodic && std::isfinite(upper ? box.max[axis] : box.min[axis]);
+  }
+
+  double tableTop() const { return surroundings_.box.min.z() - largest_radius_; }
+
+  double longerSide() const { return std::max(extent_.size().x(), extent_.size().y()); }
+
+  /// As wide as rails look right, m.
+  double cushionWidth() const { return std::max(0.02 * longerSide(), largest_radius_); }
+
+  void addTable() {
+    // An open side gets a margin, so that balls do not start on the edge.
+    Extent top = extent_;
+    for (int axis = 0; axis < 2; ++axis) {
+      const double margin = 0.5 * std::max(extent_.size()[axis], 0.4 * longerSide());
+      top.min[axis] -= closed(axis, false) || surroundings_.periodic ? 0 : margin;
+      top.max[axis] += closed(axis, true) || surroundings_.periodic ? 0 : margin;
+    }
+    const double thickness = 0.02 * longerSide();
+    addBlock("table", kCloth, {top.centre().x(), top.centre().y(), tableTop() - thickness / 2},
+             {top.size().x(), top.size().y(), thickness});
+  }
+
+  void addCushions() {
+    for (int axis = 0; axis < 2; ++axis) {
+      for (const bool upper : {false, true}) {
+        if (closed(axis, upper)) {
+          addCushion(axis, upper);
+        }
+      }
+    }
+  }
+
+  /// A green cushion along a face, and wood behind it.
+  void addCushion(int axis, bool upper) {
+    const double width = cushionWidth();
+    const double wood = 1.6 * width;
+    const double height = 1.3 * largest_radius_;  // the height at which a real cushion is hit
+    const double below = 0.02 * longerSide();
+    const double outwards = upper ? 1 : -1;
+    const int along = 1 - axis;
+
+    Vector3 centre = extent_.centre();
+    Vector3 size;
+    centre[axis] = (upper ? extent_.max : extent_.min)[axis] + outwards * width / 2;
+    centre.z() = tableTop() + (height - below) / 2;
+    size[axis] = width;
+    size[along] = extent_.size()[along];
+    size.z() = height + below;
+    if (axis == 0) {  // these fill the corners
+      size[along] += 2 * width;
+    }
+    addBlock("cushions", kCushion, centre, size);
+
+    centre[axis] += outwards * (width + wood) / 2;
+    centre.z() += 0.1 * height;
+    size[axis] = wood;
+    size[along] = extent_.size()[along] + 2 * width + (axis == 0 ? 2 * wood : 0);
+    size.z() += 0.2 * height;
+    addBlock("rails", kWood, centre, size);
+  }
+
+  void addFloor() {
+    const double bottom = surroundings_.box.min.z();
+    if (!std::isfinite(bottom)) {
+      return;
+    }
+    const double thickness = 0.01 * longerSide();
+    addBlock("floor", kFloor, {extent_.centre().x(), extent_.centre().y(), bottom - thickness / 2},
+             {extent_.size().x(), extent_.size().y(), thickness});
+  }
+
+  /// The edges of the box between finite corners.
+  void addEdges() {
+    const Box& box = surroundings_.box;
+    std::vector<geometry_msgs::Point> points;
+    for (int axis = 0; axis < 3; ++axis) {
+      const int u = (axis + 1) % 3;
+      const int v = (axis + 2) % 3;
+      for (const double at_u : {box.min[u], box.max[u]}) {
+        for (const double at_v : {box.min[v], box.max[v]}) {
+          if (std::isfinite(at_u) && std::isfinite(at_v)) {
+            Vector3 end;
+            end[u] = at_u;
+            end[v] = at_v;
+            end[axis] = extent_.min[axis];
+            points.push_back(toPoint(end));
+            end[axis] = extent_.max[axis];
+            points.push_back(toPoint(end));
+          }
+        }
+      }
+    }
+    if (!points.empty()) {  // an empty list is an error in RViz
+      Marker& marker = add(Marker::LINE_LIST, "box", kEdge);
+      marker.points = std::move(points);
+      marker.scale.x = 0.003 * extent_.size().maxCoeff();
+    }
+  }
+
+  /// A slab behind the plane. Floors are opaque; walls and ceilings let the balls be seen.
+  void addPlane(const Plane& plane) {
+    const double length = 1.5 * extent_.size().maxCoeff();
+    const double thickness = 0.01 * length;
+    const Vector3 middle = extent_.centre();
+    const double inside = dot(plane.normal, middle) - plane.offset;  // m from the plane
+    Vector3 centre = middle - plane.normal * (inside + thickness / 2);
+    Vector3 size{length, length, thickness};
+    std_msgs::ColorRGBA color = plane.normal.z() > 0.1 ? kFloor : kWall;
+    Eigen::Quaterniond turn = Eigen::Quaterniond::FromTwoVectors(Vector3::UnitZ(), plane.normal);
+    if (surroundings_.planar()) {  // a low wall on the table, its x axis upright
+      size.x() = 3 * largest_radius_;
+      centre.z() = tableTop() + size.x() / 2;
+      color = kWood;
+      Eigen::Matrix3d axes;
+      axes << Vector3::UnitZ(), plane.normal.cross(Vector3::UnitZ()), plane.normal;
+      turn = axes;
+    }
+    Marker& marker = addBlock("planes", color, centre, size);
+    marker.pose.orientation.x = turn.x();
+    marker.pose.orientation.y = turn.y();
+    marker.pose.orientation.z = turn.z();
+    marker.pose.orientation.w = turn.w();
+  }
+
+  const Surroundings& surroundings_;
+  const Extent extent_;
+  const std::string frame_id_;
+  double largest_radius_ = 0;  // m
+  visualization_msgs::MarkerArray array_;
+};
+
+}  // namespace
+
+visualization_msgs::MarkerArray sceneMarkers(const Surroundings& surroundings,
+                                             const BallStates& balls,
+                                             const std::vector<double>& radii,
+                                             const std::string& frame_id) {
+  return Builder(surroundings, balls, radii, frame_id).build();
+}
+
+}  // namespace ball_sim
