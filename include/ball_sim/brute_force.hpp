@@ -84,6 +84,7 @@ class BruteForce final : public Method {
         advance(event.dt);
         resolve(event);
       }
+      if (elapsed_ > 1) restartClock(now());
     }
   }
   using Method::advanceTo;
@@ -133,6 +134,7 @@ class BruteForce final : public Method {
   struct Body {
     BallId id = 0;
     BallId last_partner = kNobody;  // of the last impact, when no other change came after
+    Vec last_normal;                // from the smaller id to the larger, of that impact
     Vec x, v, a;                    // m, m/s, m/s^2, at the present instant
     Real radius, w;                 // m, 1/kg
     double mass = 0;                // kg
@@ -183,9 +185,13 @@ class BruteForce final : public Method {
     if (!surroundings_.periodic) return kNever<Real>;
     Real shortest = edge(0);
     for (int axis = 1; axis < periodicAxes(); ++axis) shortest = std::min(shortest, edge(axis));
-    Real fastest = 0;
-    for (const Body& body : bodies_) fastest = std::max<Real>(fastest, dot(body.v, body.v));
-    return fastest > 0 ? Real(shortest / (4 * sqrt(fastest))) : kNever<Real>;
+    Real stride = kNever<Real>;
+    for (const Body& body : bodies_) {  // v t + a t^2 / 2 = shortest / 4
+      const Real v = speedOf(body);
+      const Real pace = v + sqrt(v * v + sqrt(dot(body.a, body.a)) * (shortest / 2));
+      if (pace > 0) stride = std::min(stride, Real(shortest / (2 * pace)));
+    }
+    return stride;
   }
 
   Event earliest() const {
@@ -232,9 +238,14 @@ class BruteForce final : public Method {
     const Vec dv = b.v - a.v;
     const Vec da = b.a - a.a;
     if (dot(da, da) > 0) return timeOfImpactAccelerated<Real>(dx, dv, da, reach);
-    // In straight relative motion two balls that have just met do not meet again.
+    // In straight relative motion two balls that have just met do not meet again, unless it is
+    // another image that comes from another side.
     const bool just_met = a.last_partner == b.id && b.last_partner == a.id;
-    if (just_met && dot(dx, dx) < reach * reach * Real(1 + 1e-6)) return kNever<Real>;
+    const Real squared = dot(dx, dx);
+    if (just_met && squared < reach * reach * Real(1 + 1e-6) &&
+        dot(dx, a.last_normal) > Real(0.9) * reach) {
+      return kNever<Real>;
+    }
     return timeOfImpact<Real>(dx, dv, reach);
   }
 
@@ -273,17 +284,21 @@ class BruteForce final : public Method {
     const Real reach = a.radius + b.radius;
     const Real speed = dot(a.v, n) - dot(b.v, n);
     Real e = Real(surroundings_.restitution);
+    Real least = leastRebound<Real>(dot(Vec(a.a - b.a), n), reach);
     if (e < 1) {
       const bool a_collapses = a.history.record(elapsed_, speed, reach);
       const bool b_collapses = b.history.record(elapsed_, speed, reach);
-      if (a_collapses || b_collapses) e = 1;
+      if (a_collapses || b_collapses) {
+        e = 1;
+        least = std::max(least, collapseRebound<Real>(speedOf(a), speedOf(b)));
+      }
     }
-    const Real least = leastRebound<Real>(dot(Vec(a.a - b.a), n), reach);
     const Exchange<Real> passed = collide<Real>(a.v, a.w, b.v, b.w, n, e, least);
     velocityChanged(a);
     velocityChanged(b);
     a.last_partner = b.id;
     b.last_partner = a.id;
+    a.last_normal = b.last_normal = n;
     if (!(passed.impulse > 0)) return;
     ++statistics_.ball_collisions;
     statistics_.virial += double(passed.impulse * reach);
@@ -296,14 +311,24 @@ class BruteForce final : public Method {
     const Real pull = dot(body.a, wall.normal);
     const Real speed = -dot(body.v, wall.normal);
     Real e = Real(surroundings_.restitution);
-    if (e < 1 && !(pull < 0) && body.history.record(elapsed_, speed, body.radius)) e = 1;
+    Real least = 0;
+    if (e < 1 && !(pull < 0) && body.history.record(elapsed_, speed, body.radius)) {
+      e = 1;
+      least = collapseRebound<Real>(speedOf(body), Real(0));
+    }
     noteOverlap(wall.offset + body.radius - dot(body.x, wall.normal));
-    collideWithWall<Real>(body.v, wall.normal, e);
+    collideWithWall<Real>(body.v, wall.normal, e, least);
     if (comesToRest<Real>(dot(body.v, wall.normal), pull, body.radius)) body.resting.add(index);
     velocityChanged(body);
     if (!(speed > 0)) return;
     ++statistics_.wall_collisions;
-    report(body, wall.partner, -wall.normal, (1 + e) * speed / body.w, speed);
+    const Real change = std::max((1 + e) * speed, speed + least);
+    report(body, wall.partner, -wall.normal, change / body.w, speed);
+  }
+
+  static Real speedOf(const Body& body) {
+    using std::sqrt;
+    return sqrt(dot(body.v, body.v));
   }
 
   // After any change of velocity: forget the partner, leave or keep the walls rested on.

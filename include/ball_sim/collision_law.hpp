@@ -77,11 +77,16 @@ Exchange<Real> collide(VectorOf<Real>& v1, Real w1, VectorOf<Real>& v2, Real w2,
 /// The same against a wall at rest: the limit of an infinite second mass.
 /// @param v  velocity, m/s; changed in place
 /// @param inward  unit normal of the wall, towards the ball
+/// @param least_rebound  m/s, >= 0: it leaves at least this fast (see collapse_guard.hpp); 0: none
 /// @return speed of approach, m/s; <= 0: it leaves, and nothing happened
 template <class Real>
-Real collideWithWall(VectorOf<Real>& v, const VectorOf<Real>& inward, Real restitution) {
+Real collideWithWall(VectorOf<Real>& v, const VectorOf<Real>& inward, Real restitution,
+                     Real least_rebound = 0) {
   const Real approach_speed = -dot(v, inward);
-  if (approach_speed > 0) v += ((1 + restitution) * approach_speed) * inward;
+  if (!(approach_speed > 0)) return approach_speed;
+  Real change = (1 + restitution) * approach_speed;
+  if (change < approach_speed + least_rebound) change = approach_speed + least_rebound;
+  v += change * inward;
   return approach_speed;
 }
 
