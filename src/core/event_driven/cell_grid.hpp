@@ -16,6 +16,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <vector>
 
 #include "ball_sim/surroundings.hpp"
@@ -76,6 +77,16 @@ struct alignas(16) Cell {
   /// Beyond three balls the last of these is the head of a chain that holds the third and later.
   std::array<Slot, kInPlace> slots = {kNoSlot, kNoSlot, kNoSlot};
   std::uint32_t count = 0;
+};
+
+/// A block of cells: each row's offset plus each column's is a cell.
+struct CellBlock {
+  std::array<std::uint32_t, 9> row;  ///< along y and z
+  std::array<Image, 9> row_image;
+  std::array<std::uint32_t, 3> column;  ///< along x
+  std::array<Image, 3> column_image;
+  std::size_t rows = 0;
+  std::size_t columns = 0;
 };
 
 /// One level of cells, and who is in them.
@@ -160,25 +171,26 @@ class CellLevel {
     (before != kNoSlot ? next_[before] : guests_[index]) = after;
   }
 
-  /// Adds the members of a cell. Needs room for three beyond candidates.count.
-  void gather(std::uint32_t index, Image image, Candidates& candidates) const {
-    const Cell& cell = cells_[index];
-    for (std::size_t i = 0; i < Cell::kInPlace; ++i) {
-      candidates.slots[candidates.count + i] = cell.slots[i];
-      candidates.images[candidates.count + i] = image;
-    }
-    if (cell.count <= Cell::kInPlace) {
-      candidates.count += cell.count;
+  /// Adds the members of the cells at rows[..] + columns[..]; the compiler unrolls the 27 of a full
+  /// neighbourhood.
+  template <bool kWraps>
+  void gather(const CellBlock& block, Candidates& candidates) const {
+    candidates.reserve(27 * 4);
+    if (block.rows == 9 && block.columns == 3) {
+      gatherRows<kWraps>(block, 9, 3, candidates);
     } else {
-      candidates.count += Cell::kInPlace;
-      for (Slot s = next_[cell.slots[2]]; s != kNoSlot; s = next_[s]) candidates.add(s, image);
-      candidates.reserve(27 * Cell::kInPlace);
+      gatherRows<kWraps>(block, block.rows, block.columns, candidates);
     }
   }
 
-  void gatherGuests(std::uint32_t index, Image image, Candidates& candidates) const {
-    for (Slot s = guests_[index]; s != kNoSlot; s = next_[s]) candidates.add(s, image);
-    candidates.reserve(27 * Cell::kInPlace);
+  void gatherGuests(const CellBlock& block, Candidates& candidates) const {
+    for (std::size_t r = 0; r < block.rows; ++r) {
+      for (std::size_t c = 0; c < block.columns; ++c) {
+        const Image image = block.row_image[r] + block.column_image[c];
+        Slot s = guests_[block.row[r] + block.column[c]];
+        for (; s != kNoSlot; s = next_[s]) candidates.add(s, image);
+      }
+    }
   }
 
   std::size_t bytes() const {
@@ -190,6 +202,35 @@ class CellLevel {
   }
 
  private:
+  template <bool kWraps>
+  inline __attribute__((always_inline)) void gatherRows(const CellBlock& block, std::size_t rows,
+                                                        std::size_t columns,
+                                                        Candidates& candidates) const {
+    for (std::size_t r = 0; r < rows; ++r) {
+      for (std::size_t c = 0; c < columns; ++c) {
+        const Cell& cell = cells_[block.row[r] + block.column[c]];
+        // One copy of the whole cell; what is too much is overwritten by the next.
+        std::memcpy(&candidates.slots[candidates.count], &cell, sizeof(Cell));
+        if constexpr (kWraps) {
+          const Image image = block.row_image[r] + block.column_image[c];
+          const std::array<Image, 4> images = {image, image, image, image};
+          std::memcpy(&candidates.images[candidates.count], &images, sizeof(images));
+        }
+        if (__builtin_expect(cell.count <= Cell::kInPlace, 1)) {
+          candidates.count += cell.count;
+        } else {
+          gatherChain(cell, block.row_image[r] + block.column_image[c], candidates);
+        }
+      }
+    }
+  }
+
+  void gatherChain(const Cell& cell, Image image, Candidates& candidates) const {
+    candidates.count += Cell::kInPlace;
+    for (Slot s = next_[cell.slots[2]]; s != kNoSlot; s = next_[s]) candidates.add(s, image);
+    candidates.reserve(27 * 4);
+  }
+
   void dropLast(Cell& cell, std::uint32_t last) {
     cell.slots[last] = last == 2 ? next_[cell.slots[2]] : kNoSlot;
   }
@@ -272,6 +313,12 @@ class CellGrid {
   /// Number of cells from end to end of a bounded axis.
   std::int32_t count(std::size_t axis, std::size_t level) const {
     return static_cast<std::int32_t>(axes_[axis].cells << levels_[level].depth());
+  }
+
+  /// Whether a box face bounds the cells at a coordinate, towards `direction` (-1 or +1).
+  bool isWall(std::size_t axis, std::size_t level, std::int32_t coordinate, int direction) const {
+    if (direction < 0) return axes_[axis].lower_wall && coordinate == 0;
+    return axes_[axis].upper_wall && coordinate == count(axis, level) - 1;
   }
 
   CellCoordinates coordinatesOf(const VectorOf<Real>& x, std::size_t level) const {
@@ -371,20 +418,23 @@ class CellGrid {
       if (k == axis && near[k]->cell[direction] == AxisNeighbours::kNone) return;
       candidates.wraps = candidates.wraps || near[k]->wraps;
     }
-    const bool guests = own && level.hasGuests();
-    candidates.reserve(27 * Cell::kInPlace);
+    CellBlock block;
     for (std::size_t k = from[2]; k < to[2]; ++k) {
       for (std::size_t j = from[1]; j < to[1]; ++j) {
-        const std::uint32_t row = near[2]->cell[k] + near[1]->cell[j];
-        const Image row_image = near[2]->image[k] + near[1]->image[j];
-        for (std::size_t i = from[0]; i < to[0]; ++i) {
-          level.gather(row + near[0]->cell[i], row_image + near[0]->image[i], candidates);
-          if (guests) {
-            level.gatherGuests(row + near[0]->cell[i], row_image + near[0]->image[i], candidates);
-          }
-        }
+        block.row[block.rows] = near[2]->cell[k] + near[1]->cell[j];
+        block.row_image[block.rows++] = near[2]->image[k] + near[1]->image[j];
       }
     }
+    for (std::size_t i = from[0]; i < to[0]; ++i) {
+      block.column[block.columns] = near[0]->cell[i];
+      block.column_image[block.columns++] = near[0]->image[i];
+    }
+    if (candidates.wraps) {
+      level.gather<true>(block, candidates);
+    } else {
+      level.gather<false>(block, candidates);
+    }
+    if (own && level.hasGuests()) level.gatherGuests(block, candidates);
   }
 
   std::array<GridAxis<Real>, 3> axes_;

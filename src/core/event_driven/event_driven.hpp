@@ -640,23 +640,24 @@ class EventDriven final : public Method {
       for (std::size_t i = first; i < last; ++i) {
         const Slot other = candidates_.slots[i];
         const Image image = candidates_.wraps ? candidates_.images[i] : kHomeImage;
-        if (kGravity ? setFalling(seeker, other, image, found) : setFlying(other, image)) {
-          const bool counts =
-              other != seeker.slot && !(other == seeker.just_met && touches(seeker, batch_.count));
-          batch_slots_[batch_.count] = other;
-          batch_.count += counts ? 1 : 0;
+        if constexpr (kGravity) {
+          if (!setFalling(seeker, other, image, found)) continue;
+        } else {
+          setFlying(other, image);
         }
+        if (other == seeker.just_met && touches(seeker, batch_.count)) continue;
+        batch_slots_[batch_.count] = other;
+        batch_.count += other != seeker.slot ? 1 : 0;
       }
       takeEarliest(seeker, found);
     }
   }
 
   // Puts a ball into the batch's next lane, at its own time.
-  bool setFlying(Slot other, Image image) {
+  void setFlying(Slot other, Image image) {
     const Body& body = bodies_[other];
     batch_.set(batch_.count, body.x, body.v, body.time, body.radius);
     if (image != kHomeImage) batch_.shift(batch_.count, image_shift_[image]);
-    return true;
   }
 
   // The same for balls that fall; false if they fall differently, which is settled at once.
@@ -707,12 +708,9 @@ class EventDriven final : public Method {
     if (walls_.empty() || isFixed(slot)) return;
     const Agenda& agenda = agendas_[slot];
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const GridAxis<Real>& grid_axis = grid_.axis(axis);
-      if (grid_axis.lower_wall && agenda.cell[axis] == 0) {
-        considerWall(slot, face_walls_[2 * axis], found);
-      }
-      if (grid_axis.upper_wall && agenda.cell[axis] == grid_.count(axis, agenda.level) - 1) {
-        considerWall(slot, face_walls_[2 * axis + 1], found);
+      for (const int direction : {-1, 1}) {
+        if (!grid_.isWall(axis, agenda.level, agenda.cell[axis], direction)) continue;
+        considerWall(slot, face_walls_[2 * axis + (direction > 0 ? 1 : 0)], found);
       }
     }
     for (const std::uint32_t plane : planes_) {
@@ -743,28 +741,27 @@ class EventDriven final : public Method {
       const GridAxis<Real>& axis = grid_.axis(k);
       if (axis.flat) continue;
       const int i = static_cast<int>(k);
-      const Real edge = grid_.edge(k, agenda.level);
-      const Real lower = x[i] - (axis.origin + Real(agenda.cell[k]) * edge);
-      const Real upper = (axis.origin + Real(agenda.cell[k] + 1) * edge) - x[i];
-      Real a = 0;
-      if constexpr (kGravity) a = accelerations_[slot][i];
-      if (v[i] < 0 || a < 0) considerCrossing(agenda, timeToWall<Real>(lower, v[i], a), k, -1);
-      if (v[i] > 0 || a > 0) considerCrossing(agenda, timeToWall<Real>(upper, -v[i], -a), k, 1);
+      const Real half = grid_.edge(k, agenda.level) / 2;
+      const Real from_middle = x[i] - (axis.origin + Real(2 * agenda.cell[k] + 1) * half);
+      if constexpr (kGravity) {
+        const Real a = accelerations_[slot][i];
+        considerCrossing(agenda, timeToWall<Real>(half + from_middle, v[i], a), k, -1);
+        considerCrossing(agenda, timeToWall<Real>(half - from_middle, -v[i], -a), k, 1);
+      } else {
+        // The side it flies to, without a branch on the sign.
+        const Real gap = half - std::copysign(Real(1), v[i]) * from_middle;
+        const Real wait = std::max(gap, Real(0)) / std::abs(v[i]);
+        considerCrossing(agenda, wait, k, v[i] < 0 ? -1 : 1);
+      }
     }
   }
 
-  void considerCrossing(Agenda& agenda, Real dt, std::size_t axis, int direction) const {
-    const GridAxis<Real>& grid_axis = grid_.axis(axis);
-    if (direction < 0 && grid_axis.lower_wall && agenda.cell[axis] == 0) return;
-    if (direction > 0 && grid_axis.upper_wall &&
-        agenda.cell[axis] == grid_.count(axis, agenda.level) - 1) {
-      return;
-    }
-    if (now_ + dt < agenda.crossing_time) {
-      agenda.crossing_time = now_ + dt;
-      agenda.crossing_axis = static_cast<std::int8_t>(axis);
-      agenda.crossing_direction = static_cast<std::int8_t>(direction);
-    }
+  void considerCrossing(Agenda& agenda, Real wait, std::size_t axis, int direction) const {
+    if (!(now_ + wait < agenda.crossing_time)) return;
+    if (grid_.isWall(axis, agenda.level, agenda.cell[axis], direction)) return;
+    agenda.crossing_time = now_ + wait;
+    agenda.crossing_axis = static_cast<std::int8_t>(axis);
+    agenda.crossing_direction = static_cast<std::int8_t>(direction);
   }
 
   // --- bookkeeping
