@@ -85,14 +85,32 @@ install_missing() {
     apt-get update && apt-get install --no-install-recommends ${missing[*]}
 then this again."
   fi
-  say "Installing by apt, once (some minutes; up to 2 GB with all that these need):"
+  say "Installing by apt, with what they need themselves (some minutes, once):"
   printf '%s\n' "${missing[*]}" | fold -s -w 90 | sed 's/^/     /'
   update_package_lists
+  mkdir -p "$root/build"
   as_root apt-get -q -y -o DPkg::Lock::Timeout=600 -o Dpkg::Use-Pty=0 --no-install-recommends \
-    install "${missing[@]}" </dev/null ||
-    fail "apt could not install these packages; the reason is above. Without a network, or (on
-Ubuntu 20.04) without the ROS Noetic repository, it cannot:
-see http://wiki.ros.org/noetic/Installation/Ubuntu, steps 1.2 and 1.3."
+    install "${missing[@]}" </dev/null 2>&1 | tee "$root/build/apt.log" | show_apt_progress || {
+    tail -n 30 "$root/build/apt.log" >&2
+    fail "apt could not install these packages; the reason is above, all of it in build/apt.log.
+Without a network it cannot; on Ubuntu 20.04 it needs the ROS Noetic repository:
+http://wiki.ros.org/noetic/Installation/Ubuntu, steps 1.2 and 1.3."
+  }
+}
+
+# Of apt's thousands of lines, what tells how far it is.
+show_apt_progress() {
+  local line total='' count=0
+  while read -r line; do
+    case $line in
+      *' newly installed,'*) total=${line% newly installed,*} total=${total##* } ;;
+      'Need to get '* | 'After this operation'* | 'Fetched '*) printf '     %s\n' "$line" ;;
+      'Setting up '*)
+        count=$((count + 1))
+        if ((count % 50 == 0)); then printf '     %s of %s set up\n' "$count" "$total"; fi
+        ;;
+    esac
+  done
 }
 
 # Ubuntu's ROS lives in /opt/ros and has to be asked for; Debian's is in /usr.
