@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "ball_sim/ball.hpp"
 #include "ball_sim/surroundings.hpp"
 #include "ball_sim/vector.hpp"
 
@@ -72,5 +73,13 @@ class OverlapIndex {
   Surroundings surroundings_;
   std::vector<Level> levels_;
 };
+
+/// For each ball another one that it overlaps: of those that are larger, or of its size and before
+/// it, the first; nothing when there is none.
+/// @param checked  which balls to look at, one entry a ball; the others are as if not there
+/// @return indices into `balls`, one entry a ball
+std::vector<std::optional<std::size_t>> overlapsAmong(const std::vector<Ball>& balls,
+                                                      const std::vector<bool>& checked,
+                                                      const Surroundings& surroundings);
 
 }  // namespace ball_sim

@@ -1,6 +1,7 @@
-// Numbers as people read them in messages.
+// Numbers as people write and read them.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "ball_sim/vector.hpp"
@@ -12,5 +13,9 @@ std::string formatNumber(double value);
 
 /// "(x, y, z)".
 std::string formatVector(const Vector3& vector);
+
+/// A decimal number as YAML and C write it, in the C locale whatever the program's is; nothing for
+/// any other text, infinities and NaN included, and for numbers too large for a double.
+std::optional<double> parseDecimal(const std::string& text);
 
 }  // namespace ball_sim

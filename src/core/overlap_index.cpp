@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <numeric>
 
 #include "ball_sim/ball_check.hpp"
 
@@ -164,6 +165,23 @@ bool OverlapIndex::overlapsAny(const Vector3& position, double radius) const {
   bool any = false;
   search(position, radius, [&any](const Entry&) { return any = true; });
   return any;
+}
+
+std::vector<std::optional<std::size_t>> overlapsAmong(const std::vector<Ball>& balls,
+                                                      const std::vector<bool>& checked,
+                                                      const Surroundings& surroundings) {
+  std::vector<std::size_t> order(balls.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return balls[a].radius > balls[b].radius; });
+  OverlapIndex index(surroundings);
+  std::vector<std::optional<std::size_t>> found(balls.size());
+  for (const std::size_t i : order) {
+    if (!checked[i]) continue;
+    found[i] = index.find(balls[i].position, balls[i].radius);
+    index.insert(i, balls[i].position, balls[i].radius);
+  }
+  return found;
 }
 
 }  // namespace ball_sim

@@ -1,8 +1,10 @@
-// Numbers as people read them in messages.
+// Numbers as people write and read them.
 #include "ball_sim/text.hpp"
 
 #include <cstdio>
 #include <cstdlib>
+#include <locale>
+#include <sstream>
 
 namespace ball_sim {
 
@@ -19,6 +21,18 @@ std::string formatNumber(double value) {
 std::string formatVector(const Vector3& vector) {
   return "(" + formatNumber(vector.x()) + ", " + formatNumber(vector.y()) + ", " +
          formatNumber(vector.z()) + ")";
+}
+
+std::optional<double> parseDecimal(const std::string& text) {
+  if (text.find_first_not_of("0123456789+-.eE") != std::string::npos) return std::nullopt;
+  std::istringstream stream(text);
+  stream.imbue(std::locale::classic());
+  double value = 0;
+  stream >> value;
+  if (stream.fail() || stream.peek() != std::istringstream::traits_type::eof()) {
+    return std::nullopt;
+  }
+  return value;
 }
 
 }  // namespace ball_sim

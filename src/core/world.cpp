@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "ball_sim/ball_check.hpp"
 #include "ball_sim/fill.hpp"
@@ -22,25 +21,6 @@ Refusal overlapRefusal(const std::string& subject, const Ball& ball, const std::
   const Vector3 between = separation(ball.position, other.position, surroundings);
   return {RefusalCode::overlap,
           subject + " " + overlapText(other_name, between.norm(), ball.radius + other.radius)};
-}
-
-// For each ball the first other one, by index, that it overlaps among those that are larger, or of
-// its size and before it; nothing when there is none. `checked` says which balls to look at.
-std::vector<std::optional<std::size_t>> overlapsAmong(const std::vector<Ball>& balls,
-                                                      const std::vector<bool>& checked,
-                                                      const Surroundings& surroundings) {
-  std::vector<std::size_t> order(balls.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return balls[a].radius > balls[b].radius; });
-  OverlapIndex index(surroundings);
-  std::vector<std::optional<std::size_t>> found(balls.size());
-  for (const std::size_t i : order) {
-    if (!checked[i]) continue;
-    found[i] = index.find(balls[i].position, balls[i].radius);
-    index.insert(i, balls[i].position, balls[i].radius);
-  }
-  return found;
 }
 
 std::string listedName(std::size_t index) { return "balls[" + std::to_string(index) + "]"; }
