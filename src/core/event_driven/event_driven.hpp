@@ -633,64 +633,61 @@ class EventDriven final : public Method {
     return {slot, just_met, positionNow(slot), velocityNow(slot), bodies_[slot].radius};
   }
 
-  // Takes the earliest impact with any of the candidates, if it is earlier than `found`.
+  // Takes the earliest impact with any of the candidates, if it is earlier than `found`. The ball
+  // itself may be among them: it never approaches itself.
   void considerCandidates(const Seeker& seeker, Found& found) {
     for (std::size_t first = 0; first < candidates_.count; first += batch_.kCapacity) {
-      const std::size_t last = std::min(candidates_.count, first + batch_.kCapacity);
-      for (std::size_t i = first; i < last; ++i) {
-        const Slot other = candidates_.slots[i];
-        const Image image = candidates_.wraps ? candidates_.images[i] : kHomeImage;
-        if constexpr (kGravity) {
-          if (!setFalling(seeker, other, image, found)) continue;
-        } else {
-          setFlying(other, image);
+      const std::size_t number = std::min(candidates_.count - first, batch_.kCapacity);
+      batch_slots_ = &candidates_.slots[first];
+      if constexpr (kGravity) {
+        loadFalling(seeker, first, number, found);
+      } else {
+        batch_.load(bodies_.front().x.data(), batch_slots_, number);
+        if (candidates_.wraps) {
+          for (std::size_t i = 0; i < number; ++i) {
+            batch_.shift(i, image_shift_[candidates_.images[first + i]]);
+          }
         }
-        if (other == seeker.just_met && touches(seeker, batch_.count)) continue;
-        batch_slots_[batch_.count] = other;
-        batch_.count += other != seeker.slot ? 1 : 0;
       }
       takeEarliest(seeker, found);
     }
   }
 
-  // Puts a ball into the batch's next lane, at its own time.
-  void setFlying(Slot other, Image image) {
-    const Body& body = bodies_[other];
-    batch_.set(batch_.count, body.x, body.v, body.time, body.radius);
-    if (image != kHomeImage) batch_.shift(batch_.count, image_shift_[image]);
-  }
-
-  // The same for balls that fall; false if they fall differently, which is settled at once.
-  bool setFalling(const Seeker& seeker, Slot other, Image image, Found& found) {
-    Vec x = positionNow(other);
-    if (image != kHomeImage) x += image_shift_[image];
-    const Vec v = velocityNow(other);
-    const Vec da = accelerations_[other] - accelerations_[seeker.slot];
-    if (dot(da, da) > 0) {
-      const Real reach = bodies_[other].radius + seeker.radius;
-      const Real wait = timeOfImpactAccelerated<Real>(x - seeker.x, v - seeker.v, da, reach);
-      takeIfEarlier(other, now_ + wait, found);
-      return false;
+  // Balls that fall go into the batch as they are now; those that fall differently from the seeker
+  // are settled at once.
+  void loadFalling(const Seeker& seeker, std::size_t first, std::size_t number, Found& found) {
+    batch_.count = 0;
+    for (std::size_t i = first; i < first + number; ++i) {
+      const Slot other = candidates_.slots[i];
+      Vec x = positionNow(other);
+      if (candidates_.wraps) x += image_shift_[candidates_.images[i]];
+      const Vec v = velocityNow(other);
+      const Vec da = accelerations_[other] - accelerations_[seeker.slot];
+      if (dot(da, da) > 0) {
+        const Real reach = bodies_[other].radius + seeker.radius;
+        const Real wait = timeOfImpactAccelerated<Real>(x - seeker.x, v - seeker.v, da, reach);
+        takeIfEarlier(other, now_ + wait, found);
+      } else {
+        candidates_.slots[first + batch_.count] = other;
+        batch_.set(batch_.count++, x, v, now_, bodies_[other].radius);
+      }
     }
-    batch_.set(batch_.count, x, v, now_, bodies_[other].radius);
-    return true;
   }
 
   // In straight relative motion two balls that touch and have just met do not meet again.
-  bool touches(const Seeker& seeker, std::size_t i) const {
+  bool justParted(const Seeker& seeker, std::size_t i) const {
+    if (batch_slots_[i] != seeker.just_met) return false;
     const Vec dx = batch_.placeAt(i, now_) - seeker.x;
     const Real reach = batch_.radius[i] + seeker.radius;
     return dot(dx, dx) < reach * reach * Real(1 + 1e-6);
   }
 
-  // Empties the batch: its earliest impact, if it is earlier than `found`.
   void takeEarliest(const Seeker& seeker, Found& found) {
     findImpacts(batch_, seeker.x.data(), seeker.v.data(), seeker.radius, now_);
     for (std::size_t i = 0; i < batch_.count; ++i) {
       const Real time = now_ + batch_.wait[i];
-      if (time <= found.time) takeIfEarlier(batch_slots_[i], time, found);
+      if (time <= found.time && !justParted(seeker, i)) takeIfEarlier(batch_slots_[i], time, found);
     }
-    batch_.count = 0;
   }
 
   void takeIfEarlier(Slot other, Real time, Found& found) const {
@@ -737,6 +734,8 @@ class EventDriven final : public Method {
     if (isFixed(slot)) return;
     const Vec x = positionNow(slot);
     const Vec v = velocityNow(slot);
+    std::array<Real, 3> waits = {kNever<Real>, kNever<Real>, kNever<Real>};
+    std::array<int, 3> directions = {0, 0, 0};
     for (std::size_t k = 0; k < 3; ++k) {
       const GridAxis<Real>& axis = grid_.axis(k);
       if (axis.flat) continue;
@@ -745,23 +744,29 @@ class EventDriven final : public Method {
       const Real from_middle = x[i] - (axis.origin + Real(2 * agenda.cell[k] + 1) * half);
       if constexpr (kGravity) {
         const Real a = accelerations_[slot][i];
-        considerCrossing(agenda, timeToWall<Real>(half + from_middle, v[i], a), k, -1);
-        considerCrossing(agenda, timeToWall<Real>(half - from_middle, -v[i], -a), k, 1);
+        const Real down = waitForSide(agenda, k, -1, half + from_middle, v[i], a);
+        const Real up = waitForSide(agenda, k, 1, half - from_middle, -v[i], -a);
+        waits[k] = std::min(down, up);
+        directions[k] = up < down ? 1 : -1;
       } else {
-        // The side it flies to, without a branch on the sign.
+        // The side it flies to, without a branch on the sign; never zero over zero.
         const Real gap = half - std::copysign(Real(1), v[i]) * from_middle;
-        const Real wait = std::max(gap, Real(0)) / std::abs(v[i]);
-        considerCrossing(agenda, wait, k, v[i] < 0 ? -1 : 1);
+        waits[k] = std::max(gap, std::numeric_limits<Real>::min()) / std::abs(v[i]);
+        directions[k] = v[i] < 0 ? -1 : 1;
+        if (grid_.isWall(k, agenda.level, agenda.cell[k], directions[k])) waits[k] = kNever<Real>;
       }
     }
+    std::size_t first = waits[1] < waits[0] ? 1 : 0;
+    first = waits[2] < waits[first] ? 2 : first;
+    agenda.crossing_time = now_ + waits[first];
+    agenda.crossing_axis = static_cast<std::int8_t>(first);
+    agenda.crossing_direction = static_cast<std::int8_t>(directions[first]);
   }
 
-  void considerCrossing(Agenda& agenda, Real wait, std::size_t axis, int direction) const {
-    if (!(now_ + wait < agenda.crossing_time)) return;
-    if (grid_.isWall(axis, agenda.level, agenda.cell[axis], direction)) return;
-    agenda.crossing_time = now_ + wait;
-    agenda.crossing_axis = static_cast<std::int8_t>(axis);
-    agenda.crossing_direction = static_cast<std::int8_t>(direction);
+  Real waitForSide(const Agenda& agenda, std::size_t axis, int direction, Real gap, Real speed,
+                   Real acceleration) const {
+    if (grid_.isWall(axis, agenda.level, agenda.cell[axis], direction)) return kNever<Real>;
+    return timeToWall<Real>(gap, speed, acceleration);
   }
 
   // --- bookkeeping
@@ -812,9 +817,9 @@ class EventDriven final : public Method {
   std::size_t balls_at_layout_ = 0;
   bool ready_ = false;  // grid and queue hold all balls
   EventQueue<Real, EventDriven> queue_;
-  Candidates candidates_;  // scratch of a search
-  PairBatch<Real> batch_;  // scratch of a search
-  std::array<Slot, PairBatch<Real>::kCapacity> batch_slots_{};
+  Candidates candidates_;              // scratch of a search
+  PairBatch<Real> batch_;              // scratch of a search
+  const Slot* batch_slots_ = nullptr;  // of the batch's lanes
 
   Time origin_;   // when this year began
   Real now_ = 0;  // s, in this year

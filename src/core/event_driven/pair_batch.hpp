@@ -8,6 +8,11 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <type_traits>
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
 
 #include "ball_sim/time_of_impact.hpp"
 #include "ball_sim/vector.hpp"
@@ -31,6 +36,23 @@ struct PairBatch {
   // Out: time from `now` to the impact, kNever where there is none.
   alignas(64) Lane wait{};  // s
 
+  /// Copies bodies side by side: eight numbers each, place, velocity, time, radius.
+  /// @param bodies  all of them, 8 numbers apart
+  /// @param slots   which ones; their number becomes `count`
+  void load(const Real* bodies, const std::uint32_t* slots, std::size_t number) {
+    count = number;
+    std::size_t i = 0;
+#if defined(__SSE2__)
+    if constexpr (std::is_same_v<Real, double>) {
+      for (; i + 1 < number; i += 2) loadTwo(bodies + 8 * slots[i], bodies + 8 * slots[i + 1], i);
+    }
+#endif
+    for (; i < number; ++i) {
+      const Real* body = bodies + 8 * slots[i];
+      set(i, {body[0], body[1], body[2]}, {body[3], body[4], body[5]}, body[6], body[7]);
+    }
+  }
+
   void set(std::size_t i, const VectorOf<Real>& place, const VectorOf<Real>& velocity, Real at,
            Real r) {
     x[i] = place[0];
@@ -53,6 +75,23 @@ struct PairBatch {
     const Real dt = now - time[i];
     return {x[i] + dt * vx[i], y[i] + dt * vy[i], z[i] + dt * vz[i]};
   }
+
+#if defined(__SSE2__)
+ private:
+  void loadTwo(const double* a, const double* b, std::size_t i) {
+    interleave(a, b, &x[i], &y[i]);
+    interleave(a + 2, b + 2, &z[i], &vx[i]);
+    interleave(a + 4, b + 4, &vy[i], &vz[i]);
+    interleave(a + 6, b + 6, &time[i], &radius[i]);
+  }
+
+  static void interleave(const double* a, const double* b, double* firsts, double* seconds) {
+    const __m128d both_a = _mm_load_pd(a);
+    const __m128d both_b = _mm_load_pd(b);
+    _mm_store_pd(firsts, _mm_unpacklo_pd(both_a, both_b));
+    _mm_store_pd(seconds, _mm_unpackhi_pd(both_a, both_b));
+  }
+#endif
 };
 
 /// Fills batch.wait.
