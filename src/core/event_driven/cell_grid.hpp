@@ -206,27 +206,34 @@ class CellLevel {
   inline __attribute__((always_inline)) void gatherRows(const CellBlock& block, std::size_t rows,
                                                         std::size_t columns,
                                                         Candidates& candidates) const {
+    Slot* slots = candidates.slots.data();
+    Image* images = candidates.images.data();
+    std::size_t count = candidates.count;
     for (std::size_t r = 0; r < rows; ++r) {
       for (std::size_t c = 0; c < columns; ++c) {
         const Cell& cell = cells_[block.row[r] + block.column[c]];
         // One copy of the whole cell; what is too much is overwritten by the next.
-        std::memcpy(&candidates.slots[candidates.count], &cell, sizeof(Cell));
+        std::memcpy(slots + count, &cell, sizeof(Cell));
+        const Image image = block.row_image[r] + block.column_image[c];
         if constexpr (kWraps) {
-          const Image image = block.row_image[r] + block.column_image[c];
-          const std::array<Image, 4> images = {image, image, image, image};
-          std::memcpy(&candidates.images[candidates.count], &images, sizeof(images));
+          const std::array<Image, 4> same = {image, image, image, image};
+          std::memcpy(images + count, &same, sizeof(same));
         }
         if (__builtin_expect(cell.count <= Cell::kInPlace, 1)) {
-          candidates.count += cell.count;
+          count += cell.count;
         } else {
-          gatherChain(cell, block.row_image[r] + block.column_image[c], candidates);
+          candidates.count = count + Cell::kInPlace;
+          gatherChain(cell, image, candidates);
+          slots = candidates.slots.data();
+          images = candidates.images.data();
+          count = candidates.count;
         }
       }
     }
+    candidates.count = count;
   }
 
   void gatherChain(const Cell& cell, Image image, Candidates& candidates) const {
-    candidates.count += Cell::kInPlace;
     for (Slot s = next_[cell.slots[2]]; s != kNoSlot; s = next_[s]) candidates.add(s, image);
     candidates.reserve(27 * 4);
   }

@@ -732,41 +732,60 @@ class EventDriven final : public Method {
     Agenda& agenda = agendas_[slot];
     agenda.crossing_time = kNever<Real>;
     if (isFixed(slot)) return;
+    if constexpr (kGravity) {
+      findCrossingFalling(slot);
+    } else {
+      findCrossingFlying(slot);
+    }
+  }
+
+  // Without a branch on signs, and with one division: a/b < c/d is tested as a d < c b.
+  void findCrossingFlying(Slot slot) {
+    Agenda& agenda = agendas_[slot];
+    const Vec x = positionNow(slot);
+    const Vec& v = bodies_[slot].v;
+    std::array<Real, 3> gap{};
+    std::array<Real, 3> speed{};  // 0: never leaves that way
+    for (std::size_t k = 0; k < 3; ++k) {
+      const GridAxis<Real>& axis = grid_.axis(k);
+      const int i = static_cast<int>(k);
+      const Real half = grid_.edge(k, agenda.level) / 2;
+      const Real from_middle = x[i] - (axis.origin + Real(2 * agenda.cell[k] + 1) * half);
+      const Real towards = half - std::copysign(Real(1), v[i]) * from_middle;
+      gap[k] = std::max(towards, std::numeric_limits<Real>::min());
+      const bool closed =
+          axis.flat || grid_.isWall(k, agenda.level, agenda.cell[k], v[i] < 0 ? -1 : 1);
+      speed[k] = closed ? Real(0) : std::abs(v[i]);
+    }
+    std::size_t k = gap[1] * speed[0] < gap[0] * speed[1] ? 1 : 0;
+    k = gap[2] * speed[k] < gap[k] * speed[2] ? 2 : k;
+    agenda.crossing_time = now_ + gap[k] / speed[k];
+    agenda.crossing_axis = static_cast<std::int8_t>(k);
+    agenda.crossing_direction = v[static_cast<int>(k)] < 0 ? -1 : 1;
+  }
+
+  void findCrossingFalling(Slot slot) {
+    Agenda& agenda = agendas_[slot];
     const Vec x = positionNow(slot);
     const Vec v = velocityNow(slot);
-    std::array<Real, 3> waits = {kNever<Real>, kNever<Real>, kNever<Real>};
-    std::array<int, 3> directions = {0, 0, 0};
     for (std::size_t k = 0; k < 3; ++k) {
       const GridAxis<Real>& axis = grid_.axis(k);
       if (axis.flat) continue;
       const int i = static_cast<int>(k);
       const Real half = grid_.edge(k, agenda.level) / 2;
       const Real from_middle = x[i] - (axis.origin + Real(2 * agenda.cell[k] + 1) * half);
-      if constexpr (kGravity) {
-        const Real a = accelerations_[slot][i];
-        const Real down = waitForSide(agenda, k, -1, half + from_middle, v[i], a);
-        const Real up = waitForSide(agenda, k, 1, half - from_middle, -v[i], -a);
-        waits[k] = std::min(down, up);
-        directions[k] = up < down ? 1 : -1;
-      } else {
-        // The side it flies to, without a branch on the sign; never zero over zero.
-        const Real gap = half - std::copysign(Real(1), v[i]) * from_middle;
-        waits[k] = std::max(gap, std::numeric_limits<Real>::min()) / std::abs(v[i]);
-        directions[k] = v[i] < 0 ? -1 : 1;
-        if (grid_.isWall(k, agenda.level, agenda.cell[k], directions[k])) waits[k] = kNever<Real>;
-      }
+      const Real a = accelerations_[slot][i];
+      considerSide(agenda, k, -1, timeToWall<Real>(half + from_middle, v[i], a));
+      considerSide(agenda, k, 1, timeToWall<Real>(half - from_middle, -v[i], -a));
     }
-    std::size_t first = waits[1] < waits[0] ? 1 : 0;
-    first = waits[2] < waits[first] ? 2 : first;
-    agenda.crossing_time = now_ + waits[first];
-    agenda.crossing_axis = static_cast<std::int8_t>(first);
-    agenda.crossing_direction = static_cast<std::int8_t>(directions[first]);
   }
 
-  Real waitForSide(const Agenda& agenda, std::size_t axis, int direction, Real gap, Real speed,
-                   Real acceleration) const {
-    if (grid_.isWall(axis, agenda.level, agenda.cell[axis], direction)) return kNever<Real>;
-    return timeToWall<Real>(gap, speed, acceleration);
+  void considerSide(Agenda& agenda, std::size_t axis, int direction, Real wait) const {
+    if (!(now_ + wait < agenda.crossing_time)) return;
+    if (grid_.isWall(axis, agenda.level, agenda.cell[axis], direction)) return;
+    agenda.crossing_time = now_ + wait;
+    agenda.crossing_axis = static_cast<std::int8_t>(axis);
+    agenda.crossing_direction = static_cast<std::int8_t>(direction);
   }
 
   // --- bookkeeping
