@@ -55,24 +55,23 @@ void CommandQueue::waitUntil(Clock::time_point wake) {
   arrived_.wait_until(lock, wake, [&] { return !queue_.empty(); });
 }
 
+void CommandQueue::answer() {
+  const Lock lock(mutex_);
+  finish(unanswered_, State::done);
+}
+
 void CommandQueue::withdrawTimed() {
   const Lock lock(mutex_);
-  for (const auto& entry : timed_) {
-    entry.second->state = State::withdrawn;
-  }
-  timed_.clear();
-  finished_.notify_all();
+  std::deque<CommandPointer> all = takeTimed(kNever);
+  finish(all, State::withdrawn);
 }
 
 void CommandQueue::close() {
+  answer();
   withdrawTimed();
   const Lock lock(mutex_);
   closed_ = true;
-  for (const CommandPointer& command : queue_) {
-    command->state = State::withdrawn;
-  }
-  queue_.clear();
-  finished_.notify_all();
+  finish(queue_, State::withdrawn);
 }
 
 bool CommandQueue::run(const std::deque<CommandPointer>& commands, Lock& lock) {
@@ -85,11 +84,18 @@ bool CommandQueue::run(const std::deque<CommandPointer>& commands, Lock& lock) {
     lock.unlock();
     command->work();
     lock.lock();
-    command->state = State::done;
-    finished_.notify_all();
+    unanswered_.push_back(command);
     any = true;
   }
   return any;
+}
+
+void CommandQueue::finish(std::deque<CommandPointer>& commands, State state) {
+  for (const CommandPointer& command : commands) {
+    command->state = state;
+  }
+  commands.clear();
+  finished_.notify_all();
 }
 
 std::deque<CommandQueue::CommandPointer> CommandQueue::takeTimed(std::int64_t now) {

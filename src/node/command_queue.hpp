@@ -39,12 +39,16 @@ class CommandQueue {
   // --- for the world's thread
 
   /// Does what waits for `now` or earlier, in order of time, then what waits for no certain time,
-  /// in order of arrival. What arrives meanwhile is left for the next call.
+  /// in order of arrival. What arrives meanwhile is left for the next call. Who asked goes on
+  /// waiting until answer().
   /// @return whether anything was done
   bool runDue(std::int64_t now);
 
   /// The same, but only what waits for a certain time.
   bool runTimed(std::int64_t now);
+
+  /// Tells who asked for what was done since the last call.
+  void answer();
 
   /// The earliest time that work waits for, ns, or kNever.
   std::int64_t nextTime() const;
@@ -55,7 +59,7 @@ class CommandQueue {
   /// Takes back all that waits for a certain time.
   void withdrawTimed();
 
-  /// Takes back all that waits, and from now on all that comes.
+  /// Takes back all that waits, and from now on all that comes; answers what was done.
   void close();
 
  private:
@@ -68,6 +72,7 @@ class CommandQueue {
   using Lock = std::unique_lock<std::mutex>;
 
   bool run(const std::deque<CommandPointer>& commands, Lock& lock);
+  void finish(std::deque<CommandPointer>& commands, State state);
   std::deque<CommandPointer> takeTimed(std::int64_t now);
 
   mutable std::mutex mutex_;
@@ -75,6 +80,7 @@ class CommandQueue {
   std::condition_variable finished_;                   // something was done or withdrawn
   std::deque<CommandPointer> queue_;                   // for kNow
   std::multimap<std::int64_t, CommandPointer> timed_;  // by time, then by arrival
+  std::deque<CommandPointer> unanswered_;              // done
   bool closed_ = false;
 };
 

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -121,7 +122,9 @@ class Builder {
 
   double longerSide() const { return std::max(extent_.size().x(), extent_.size().y()); }
 
-  /// As wide as rails look right, m.
+  double tableThickness() const { return 0.02 * longerSide(); }
+
+  /// As wide as cushions look right, m.
   double cushionWidth() const { return std::max(0.02 * longerSide(), largest_radius_); }
 
   void addTable() {
@@ -132,7 +135,7 @@ class Builder {
       top.min[axis] -= closed(axis, false) || surroundings_.periodic ? 0 : margin;
       top.max[axis] += closed(axis, true) || surroundings_.periodic ? 0 : margin;
     }
-    const double thickness = 0.02 * longerSide();
+    const double thickness = tableThickness();
     addBlock("table", kCloth, {top.centre().x(), top.centre().y(), tableTop() - thickness / 2},
              {top.size().x(), top.size().y(), thickness});
   }
@@ -142,37 +145,56 @@ class Builder {
       for (const bool upper : {false, true}) {
         if (closed(axis, upper)) {
           addCushion(axis, upper);
+          addRail(axis, upper);
         }
       }
     }
   }
 
-  /// A green cushion along a face, and wood behind it.
+  /// As high as real cushions touch the ball, m.
+  double cushionHeight() const { return 1.3 * largest_radius_; }
+
+  /// A slope that rises outwards from a closed face, mitred at its ends. RViz lights what faces the
+  /// viewer: upright cushions would look black.
   void addCushion(int axis, bool upper) {
-    const double width = cushionWidth();
-    const double wood = 1.6 * width;
-    const double height = 1.3 * largest_radius_;  // the height at which a real cushion is hit
-    const double below = 0.02 * longerSide();
-    const double outwards = upper ? 1 : -1;
     const int along = 1 - axis;
-
-    Vector3 centre = extent_.centre();
-    Vector3 size;
-    centre[axis] = (upper ? extent_.max : extent_.min)[axis] + outwards * width / 2;
-    centre.z() = tableTop() + (height - below) / 2;
-    size[axis] = width;
-    size[along] = extent_.size()[along];
-    size.z() = height + below;
-    if (axis == 0) {  // these fill the corners
-      size[along] += 2 * width;
+    const double width = cushionWidth();
+    const auto corner = [&](double end, double outwards) {
+      Vector3 point;
+      point[axis] = upper ? extent_.max[axis] + outwards : extent_.min[axis] - outwards;
+      point[along] = end;
+      point.z() = tableTop() + cushionHeight() * outwards / width;
+      return point;
+    };
+    const double low = extent_.min[along];
+    const double high = extent_.max[along];
+    std::array<Vector3, 4> corners{corner(low, 0), corner(high, 0), corner(high + width, width),
+                                   corner(low - width, width)};
+    if ((corners[1] - corners[0]).cross(corners[2] - corners[0]).z() < 0) {
+      std::reverse(corners.begin(), corners.end());  // counter-clockwise seen from above
     }
-    addBlock("cushions", kCushion, centre, size);
+    Marker& marker = add(Marker::TRIANGLE_LIST, "cushions", kCushion);
+    marker.scale.x = marker.scale.y = marker.scale.z = 1;
+    for (const std::size_t i : {0, 1, 2, 0, 2, 3}) {
+      marker.points.push_back(toPoint(corners[i]));
+    }
+  }
 
-    centre[axis] += outwards * (width + wood) / 2;
-    centre.z() += 0.1 * height;
-    size[axis] = wood;
-    size[along] = extent_.size()[along] + 2 * width + (axis == 0 ? 2 * wood : 0);
-    size.z() += 0.2 * height;
+  /// The wood behind a cushion.
+  void addRail(int axis, bool upper) {
+    const int along = 1 - axis;
+    const double offset = cushionWidth();
+    const double width = 1.6 * offset;
+    const double top = tableTop() + 1.1 * cushionHeight();
+    const double bottom = tableTop() - tableThickness();
+    Vector3 centre = extent_.centre();
+    centre[axis] =
+        upper ? extent_.max[axis] + offset + width / 2 : extent_.min[axis] - offset - width / 2;
+    centre.z() = (top + bottom) / 2;
+    Vector3 size;
+    size[axis] = width;
+    size[along] = extent_.size()[along] + 2 * offset + (axis == 0 ? 2 * width : 0);
+    size.z() = top - bottom;
     addBlock("rails", kWood, centre, size);
   }
 

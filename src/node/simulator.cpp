@@ -147,7 +147,7 @@ void Simulator::serveCommands() {
   }
 }
 
-/// Tells what commands have changed.
+/// Tells what commands have changed, and then who gave them.
 void Simulator::finishCommands() {
   if (population_) {
     outputs_.publishProperties(world_, stamp());
@@ -157,6 +157,7 @@ void Simulator::finishCommands() {
     moved_ = true;
   }
   population_ = changed_ = false;
+  commands_.answer();
 }
 
 /// Sleeps until the next frame, serving commands meanwhile.

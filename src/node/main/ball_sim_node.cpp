@@ -32,8 +32,7 @@ World makeWorld(const Parameters& parameters) {
   return World(scene, options);
 }
 
-void run() {
-  ros::NodeHandle node("~");
+void run(ros::NodeHandle& node) {
   const Parameters parameters = readParameters(node);
   World world = makeWorld(parameters);
   ROS_INFO_STREAM("scene " << world.scene().name << ": " << world.size() << " balls, method "
@@ -50,8 +49,9 @@ void run() {
 int main(int argc, char** argv) {
   ros::init(argc, argv, "ball_sim");
   std::signal(SIGTERM, [](int) { ros::requestShutdown(); });
+  ros::NodeHandle node("~");  // outlives the error: the last one to go takes the log with it
   try {
-    ball_sim::run();
+    ball_sim::run(node);
   } catch (const std::exception& error) {
     ROS_FATAL_STREAM(error.what());
     return 1;
