@@ -134,7 +134,7 @@ class BruteForce final : public Method {
   struct Body {
     BallId id = 0;
     BallId last_partner = kNobody;  // of the last impact, when no other change came after
-    Vec last_normal;                // from the smaller id to the larger, of that impact
+    Vec last_normal = Vec::Zero();  // from the smaller id to the larger, of that impact
     Vec x, v, a;                    // m, m/s, m/s^2, at the present instant
     Real radius, w;                 // m, 1/kg
     double mass = 0;                // kg
@@ -335,16 +335,7 @@ class BruteForce final : public Method {
   void velocityChanged(Body& body) {
     body.last_partner = kNobody;
     if (body.resting.count == 0) return;
-    for (int i = body.resting.count - 1; i >= 0; --i) {
-      const Wall<Real>& wall = walls_[static_cast<std::size_t>(body.resting.walls[i])];
-      const Real speed = dot(body.v, wall.normal);
-      if (speed < 0 || !comesToRest<Real>(speed, dot(gravity_, wall.normal), body.radius)) {
-        body.resting.removeAt(i);
-      } else {
-        body.v -= speed * wall.normal;
-      }
-    }
-    body.a = constrainedAcceleration<Real>(gravity_, walls_, body.resting);
+    body.a = settleContacts<Real>(body.resting, body.v, body.radius, gravity_, walls_);
   }
 
   void noteOverlap(Real overlap) {

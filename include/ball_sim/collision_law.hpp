@@ -9,7 +9,9 @@
 // Assumes smooth balls (no friction, no spin) and an instantaneous impact of two partners.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "ball_sim/vector.hpp"
 
@@ -29,6 +31,19 @@ VectorOf<Real> contactNormal(const VectorOf<Real>& dx) {
   return scaled / sqrt(dot(scaled, scaled));
 }
 
+/// How far the rounding of v's components may falsify its speed along `normal`, m/s.
+///
+/// An approach no faster than this may be an approach or none: partners that touch and slide past
+/// each other could meet for ever, with changes of velocity that are rounded away. So they are made
+/// to part by as much, which no measurement would show, and the next look at them finds them apart.
+template <class Real>
+Real roundingAlong(const VectorOf<Real>& v, const VectorOf<Real>& normal) {
+  using std::abs;
+  constexpr Real kUlps = 16;
+  return kUlps * std::numeric_limits<Real>::epsilon() *
+         (abs(v[0] * normal[0]) + abs(v[1] * normal[1]) + abs(v[2] * normal[2]));
+}
+
 /// What passes between two partners at an impact, along the normal from 1 to 2.
 template <class Real>
 struct Exchange {
@@ -44,12 +59,15 @@ struct Exchange {
 /// @param normal  unit vector from 1 to 2
 /// @param restitution  0..1
 /// @param least_rebound  m/s, >= 0: they part at least this fast (see collapse_guard.hpp); 0: none
-/// @return all changes 0 unless they approach
+/// @return all changes 0 unless they approach, to rounding
 template <class Real>
 Exchange<Real> exchange(const VectorOf<Real>& v1, Real w1, const VectorOf<Real>& v2, Real w2,
                         const VectorOf<Real>& normal, Real restitution, Real least_rebound = 0) {
   Exchange<Real> result;
+  using std::abs;
   result.approach_speed = dot(v1, normal) - dot(v2, normal);
+  const Real rounding = roundingAlong(v1, normal) + roundingAlong(v2, normal);
+  if (abs(result.approach_speed) <= rounding) least_rebound = std::max(least_rebound, rounding);
   if (!(result.approach_speed > -least_rebound)) return result;
   const Real total = w1 + w2;
   Real relative_change = (1 + restitution) * result.approach_speed;
@@ -78,12 +96,15 @@ Exchange<Real> collide(VectorOf<Real>& v1, Real w1, VectorOf<Real>& v2, Real w2,
 /// @param v  velocity, m/s; changed in place
 /// @param inward  unit normal of the wall, towards the ball
 /// @param least_rebound  m/s, >= 0: it leaves at least this fast (see collapse_guard.hpp); 0: none
-/// @return speed of approach, m/s; <= 0: it leaves, and nothing happened
+/// @return speed of approach, m/s; <= 0: it leaves, and nothing happened but to rounding
 template <class Real>
 Real collideWithWall(VectorOf<Real>& v, const VectorOf<Real>& inward, Real restitution,
                      Real least_rebound = 0) {
+  using std::abs;
   const Real approach_speed = -dot(v, inward);
-  if (!(approach_speed > 0)) return approach_speed;
+  const Real rounding = roundingAlong(v, inward);
+  if (abs(approach_speed) <= rounding) least_rebound = std::max(least_rebound, rounding);
+  if (!(approach_speed > -least_rebound)) return approach_speed;
   Real change = (1 + restitution) * approach_speed;
   if (change < approach_speed + least_rebound) change = approach_speed + least_rebound;
   v += change * inward;

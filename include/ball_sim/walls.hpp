@@ -46,7 +46,7 @@ std::vector<Wall<Real>> wallsOf(const Surroundings& surroundings) {
 constexpr double kRestingHeight = 1e-14;
 
 /// Whether a ball that leaves a wall is back before it got anywhere.
-/// @param speed  away from the wall, m/s, >= 0
+/// @param speed  away from the wall, m/s
 /// @param acceleration  along the inward normal, m/s^2
 template <class Real>
 bool comesToRest(Real speed, Real acceleration, Real radius) {
@@ -71,39 +71,72 @@ struct RestingContacts {
   void removeAt(int i) { walls[i] = walls[--count]; }
 };
 
-/// Gravity less what the walls push back: the acceleration of a ball that rests on them.
+/// Gravity less what the walls push back: the acceleration of a ball that rests on them. Of all
+/// accelerations into none of the walls it is the one nearest to gravity (Gauss's principle of
+/// least constraint): gravity itself, or along one wall, or along the edge of two, or none.
 /// @param walls  all walls of the scene
 /// @return m/s^2; into none of the contacts' walls
 template <class Real>
 VectorOf<Real> constrainedAcceleration(const VectorOf<Real>& gravity,
                                        const std::vector<Wall<Real>>& walls,
                                        const RestingContacts& contacts) {
+  using std::sqrt;
   const auto normal = [&](int i) {
     return walls[static_cast<std::size_t>(contacts.walls[i])].normal;
   };
-  const auto leaves_no_wall = [&](const VectorOf<Real>& a) {
-    const Real rounding = Real(1e-12) * gravity.norm();
+  const Real rounding = Real(1e-12) * sqrt(dot(gravity, gravity));
+  VectorOf<Real> nearest = VectorOf<Real>::Zero();
+  Real least = dot(gravity, gravity);
+  const auto consider = [&](const VectorOf<Real>& a) {
     for (int i = 0; i < contacts.count; ++i) {
-      if (dot(a, normal(i)) < -rounding) return false;
+      if (dot(a, normal(i)) < -rounding) return;
     }
-    return true;
+    const VectorOf<Real> constraint = a - gravity;
+    const Real squared = dot(constraint, constraint);
+    if (squared < least) {
+      least = squared;
+      nearest = a;
+    }
   };
-  if (leaves_no_wall(gravity)) return gravity;
-  for (int i = 0; i < contacts.count; ++i) {  // slides on one wall
+  consider(gravity);
+  for (int i = 0; i < contacts.count; ++i) {
     const VectorOf<Real> n = normal(i);
-    const VectorOf<Real> a = gravity - dot(gravity, n) * n;
-    if (leaves_no_wall(a)) return a;
-  }
-  for (int i = 0; i < contacts.count; ++i) {  // slides along an edge
+    consider(gravity - dot(gravity, n) * n);
     for (int j = i + 1; j < contacts.count; ++j) {
-      const VectorOf<Real> edge = normal(i).cross(normal(j));
+      const VectorOf<Real> edge = n.cross(normal(j));
       const Real squared = dot(edge, edge);
-      if (!(squared > 0)) continue;
-      const VectorOf<Real> a = (dot(gravity, edge) / squared) * edge;
-      if (leaves_no_wall(a)) return a;
+      if (squared > 0) consider((dot(gravity, edge) / squared) * edge);
     }
   }
-  return VectorOf<Real>::Zero();
+  return nearest;
+}
+
+/// What a change of its velocity does to a ball that rests on walls: it leaves those it moves away
+/// from or into (into: the impact is still to come), and those that no longer press on it; along
+/// the others it slides.
+/// @param v  m/s; what rounding has left across the walls is taken out
+/// @return the ball's acceleration from now on, m/s^2
+template <class Real>
+VectorOf<Real> settleContacts(RestingContacts& contacts, VectorOf<Real>& v, Real radius,
+                              const VectorOf<Real>& gravity, const std::vector<Wall<Real>>& walls) {
+  using std::sqrt;
+  const auto normal = [&](int i) {
+    return walls[static_cast<std::size_t>(contacts.walls[i])].normal;
+  };
+  const Real weight = sqrt(dot(gravity, gravity));
+  for (int i = contacts.count - 1; i >= 0; --i) {
+    const Real speed = dot(v, normal(i));
+    if (comesToRest<Real>(speed, -weight, radius)) {
+      v -= speed * normal(i);
+    } else {
+      contacts.removeAt(i);
+    }
+  }
+  const VectorOf<Real> a = constrainedAcceleration<Real>(gravity, walls, contacts);
+  for (int i = contacts.count - 1; i >= 0; --i) {
+    if (dot(a, normal(i)) > Real(1e-12) * weight) contacts.removeAt(i);
+  }
+  return a;
 }
 
 }  // namespace ball_sim

@@ -122,6 +122,7 @@ Comparison compareLogs(const std::vector<Collision>& truth, const std::vector<Co
     result.envelope = std::max(result.envelope, std::abs(shadow_time - event.time));
     const double tolerance = kRoundingSpread * result.envelope;
     if (tolerance > kHorizon * time_scale) return result;
+    if (event.time.seconds() > end - tolerance) break;  // rounding may put it after the end
     Time time;
     if (!diary.take(a, event.b, time) || (event.b >= 0 && !diary.take(event.b, a, time))) {
       ADD_FAILURE() << "impact " << result.compared << " of ball " << event.a << " with " << event.b
