@@ -80,10 +80,12 @@ install_missing() {
   mapfile -t missing < <(missing_packages "$@")
   [ "${#missing[@]}" -gt 0 ] || return 0
 
-  if [ "$(id -u)" -ne 0 ] && ! command -v sudo >/dev/null; then
-    fail "packages are missing, and without sudo only root can install them. As root, run
+  if [ "$(id -u)" -ne 0 ]; then
+    say "Packages are missing; installing them needs sudo, which may ask for your password."
+    { command -v sudo >/dev/null && sudo -v; } ||
+      fail "you cannot become root by sudo here. Let root run
     apt-get update && apt-get install --no-install-recommends ${missing[*]}
-then this again."
+and then run this again."
   fi
   say "Installing by apt, with what they need themselves (some minutes, once):"
   printf '%s\n' "${missing[*]}" | fold -s -w 90 | sed 's/^/     /'
