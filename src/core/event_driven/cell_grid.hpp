@@ -22,11 +22,26 @@
 #include "ball_sim/surroundings.hpp"
 #include "ball_sim/vector.hpp"
 #include "event_driven/event_queue.hpp"
+#include "event_driven/huge_page_vector.hpp"
 
 namespace ball_sim {
 
 /// Coordinates of a cell along the axes, in the cells of one level.
 using CellCoordinates = std::array<std::int32_t, 3>;
+
+/// The place of a cell along Morton's space-filling curve (1966), which keeps near what is near.
+/// @param shift  the level's cells are 2^shift finest cells wide
+inline std::uint64_t mortonKey(const CellCoordinates& c, int shift) {
+  std::uint64_t key = 0;
+  for (int bit = 0; bit < 21; ++bit) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto coordinate = static_cast<std::uint32_t>(c[static_cast<std::size_t>(axis)])
+                              << shift;
+      key |= std::uint64_t{(coordinate >> bit) & 1} << (3 * bit + axis);
+    }
+  }
+  return key;
+}
 
 /// Images of a periodic box, as a number of three base-3 digits; kHomeImage: not shifted at all.
 using Image = std::uint32_t;
@@ -171,6 +186,17 @@ class CellLevel {
     (before != kNoSlot ? next_[before] : guests_[index]) = after;
   }
 
+  void prefetchAround(const CellCoordinates& c) const {
+    const AxisNeighbours& x = neighbours(0, c[0]);
+    const AxisNeighbours& y = neighbours(1, c[1]);
+    const AxisNeighbours& z = neighbours(2, c[2]);
+    for (std::size_t k = z.begin; k < z.end; ++k) {
+      for (std::size_t j = y.begin; j < y.end; ++j) {
+        __builtin_prefetch(&cells_[z.cell[k] + y.cell[j] + x.cell[1]]);
+      }
+    }
+  }
+
   /// Adds the members of the cells at rows[..] + columns[..]; the compiler unrolls the 27 of a full
   /// neighbourhood.
   template <bool kWraps>
@@ -265,7 +291,7 @@ class CellLevel {
   int depth_;
   std::array<std::int32_t, 3> mask_{};  // of coordinates on open axes; all ones elsewhere
   std::array<std::vector<AxisNeighbours>, 3> neighbours_;
-  std::vector<Cell> cells_;     // members
+  HugePageVector<Cell> cells_;  // members
   std::vector<Slot> guests_;    // heads of the lists of balls of finer levels; empty without any
   std::vector<Slot> next_;      // in a cell's chain, or a list of guests
   std::vector<Slot> previous_;  // in a list of guests
@@ -392,15 +418,21 @@ class CellGrid {
 
   /// The same, but only the layer of cells that came near by a crossing along `axis` towards
   /// `direction` (0 lower, 2 upper), on the levels where cells were crossed at all.
-  void gatherNewLayer(const CellCoordinates& before, const CellCoordinates& after,
-                      std::size_t level, std::size_t axis, std::size_t direction,
-                      Candidates& candidates) const {
+  /// @param unwrapped  the coordinates after the crossing, `after` before it was put back into the
+  ///                   periodic box
+  void gatherNewLayer(const CellCoordinates& before, const CellCoordinates& unwrapped,
+                      const CellCoordinates& after, std::size_t level, std::size_t axis,
+                      std::size_t direction, Candidates& candidates) const {
     candidates.clear();
     for (std::size_t m = 0; m <= level; ++m) {
-      const CellCoordinates c = coarser(after, level, m);
-      if (c[axis] == coarser(before, level, m)[axis]) continue;
-      gatherCells(levels_[m], c, axis, direction, m == level, candidates);
+      if (coarser(unwrapped, level, m)[axis] == coarser(before, level, m)[axis]) continue;
+      gatherCells(levels_[m], coarser(after, level, m), axis, direction, m == level, candidates);
     }
+  }
+
+  /// Fetches the cells around a ball from memory.
+  void prefetchNear(const CellCoordinates& c, std::size_t level) const {
+    levels_[level].prefetchAround(c);
   }
 
   std::size_t bytes() const {

@@ -31,6 +31,7 @@
 #include "event_driven/cell_grid.hpp"
 #include "event_driven/event_queue.hpp"
 #include "event_driven/grid_layout.hpp"
+#include "event_driven/huge_page_vector.hpp"
 #include "event_driven/pair_batch.hpp"
 
 namespace ball_sim {
@@ -69,22 +70,19 @@ class EventDriven final : public Method {
   const char* name() const override { return "event_driven"; }
 
   void insert(BallId id, const Ball& ball) override {
-    assert(slots_.empty() || ids_[slots_.back()] < id);
+    assert(slots_.empty() || agendas_[slots_.back()].id < id);
     const Slot slot = takeSlot();
     Body& body = bodies_[slot];
     body = {ball.position.cast<Real>(), ball.velocity.cast<Real>(), now_, Real(ball.radius)};
-    masses_[slot] = ball.mass;
-    inverse_masses_[slot] = std::isinf(ball.mass) ? Real(0) : 1 / Real(ball.mass);
-    ids_[slot] = id;
+    agendas_[slot].mass = ball.mass;
+    agendas_[slot].id = id;
     slots_.push_back(slot);
     histories_[slot] = {};
     if constexpr (kGravity) {
       accelerations_[slot] = isFixed(slot) ? Vec(Vec::Zero()) : gravity_;
       resting_[slot] = {};
     }
-    Agenda& agenda = agendas_[slot];
-    agenda.links = {};
-    ++agenda.version;
+    ++agendas_[slot].version;
     if (slots_.size() > 2 * balls_at_layout_ + 16 || !fits(body)) ready_ = false;
     if (ready_) {
       place(slot);
@@ -125,7 +123,7 @@ class EventDriven final : public Method {
     bodies_[slot].v = velocity.cast<Real>();
     velocityChanged(slot);
     if (ready_) {
-      queue_.remove(*this, slot);
+      queue_.remove(slot);
       search(slot, kNoSlot);
     }
   }
@@ -134,7 +132,7 @@ class EventDriven final : public Method {
     if (!ready_) layOut();
     while (true) {
       const Real limit = Real(target - origin_);
-      const Slot slot = queue_.peek(*this, limit);
+      const Slot slot = queue_.peek(limit, tieOrder(), expectation());
       if (slot == kNoSlot) {
         if (limit < queue_.yearLength()) {
           now_ = limit;
@@ -149,8 +147,7 @@ class EventDriven final : public Method {
         return false;
       }
       --max_events;
-      now_ = std::max(now_, due(slot));
-      queue_.pop(*this);
+      now_ = std::max(now_, queue_.pop(tieOrder()));
       ++statistics_.events;
       handle(slot);
     }
@@ -166,7 +163,7 @@ class EventDriven final : public Method {
     states.velocities.resize(slots_.size());
     for (std::size_t i = 0; i < slots_.size(); ++i) {
       const Slot slot = slots_[i];
-      states.ids[i] = ids_[slot];
+      states.ids[i] = agendas_[slot].id;
       states.positions[i] = wrapped(positionNow(slot)).template cast<double>();
       states.velocities[i] = velocityNow(slot).template cast<double>();
     }
@@ -175,14 +172,15 @@ class EventDriven final : public Method {
   Ball ball(BallId id) const override {
     const Slot slot = *find(id);
     return {wrapped(positionNow(slot)).template cast<double>(),
-            velocityNow(slot).template cast<double>(), double(bodies_[slot].radius), masses_[slot]};
+            velocityNow(slot).template cast<double>(), double(bodies_[slot].radius),
+            agendas_[slot].mass};
   }
 
   std::optional<BallId> findOverlap(const Vector3& position, double radius,
                                     std::optional<BallId> ignore) const override {
     std::optional<BallId> found;
     for (const Slot slot : slots_) {
-      const BallId id = ids_[slot];
+      const BallId id = agendas_[slot].id;
       if (id == ignore || (found && *found < id)) continue;
       const Vec dx = nearestImage(positionNow(slot) - position.cast<Real>());
       const Real reach = (bodies_[slot].radius + Real(radius)) * (1 - Real(1e-12));
@@ -195,22 +193,12 @@ class EventDriven final : public Method {
     Statistics statistics = statistics_;
     statistics.queue_depth = slots_.size();
     statistics.bytes = grid_.bytes() + queue_.bytes() + capacityBytes(bodies_) +
-                       capacityBytes(agendas_) + capacityBytes(inverse_masses_) +
-                       capacityBytes(masses_) + capacityBytes(ids_) + capacityBytes(slots_) +
-                       capacityBytes(histories_) + capacityBytes(accelerations_) +
-                       capacityBytes(resting_);
+                       capacityBytes(agendas_) + capacityBytes(slots_) + capacityBytes(histories_) +
+                       capacityBytes(accelerations_) + capacityBytes(resting_);
     return statistics;
   }
 
   void setCollisionLog(CollisionLog* log) override { log_ = log; }
-
-  // --- what the queue asks of its entries
-
-  Real due(Slot slot) const {
-    return std::min(agendas_[slot].impact_time, agendas_[slot].crossing_time);
-  }
-  QueueLinks& links(Slot slot) { return agendas_[slot].links; }
-  bool before(Slot a, Slot b) const { return tieOrder(a) < tieOrder(b); }
 
  private:
   // What others look at, in one cache line: the place at the ball's own time.
@@ -221,14 +209,15 @@ class EventDriven final : public Method {
     Real radius;
   };
 
-  // What only the ball itself needs: its next event, its cell, its place in the queue.
+  // What only the ball itself needs: its next event, its cell, its name and mass.
   struct alignas(64) Agenda {
     Real impact_time = kNever<Real>;    // s, in this year
     Real crossing_time = kNever<Real>;  // s, in this year
     std::uint32_t partner = 0;          // slot, or kWall + index into walls_
     std::uint32_t partner_version = 0;  // the partner's version when the impact was found
     std::uint32_t version = 0;          // counts the changes of this ball's trajectory
-    QueueLinks links;
+    BallId id = 0;
+    double mass = 0;  // kg
     CellCoordinates cell = {0, 0, 0};
     std::int8_t crossing_axis = 0;
     std::int8_t crossing_direction = 0;  // -1 or +1
@@ -242,16 +231,16 @@ class EventDriven final : public Method {
     std::uint32_t partner = 0;
   };
 
-  template <class T>
-  static std::size_t capacityBytes(const std::vector<T>& v) {
-    return v.capacity() * sizeof(T);
+  template <class Vector>
+  static std::size_t capacityBytes(const Vector& v) {
+    return v.capacity() * sizeof(typename Vector::value_type);
   }
 
   // --- ids and slots
 
   std::vector<Slot>::iterator find(BallId id) {
     return std::lower_bound(slots_.begin(), slots_.end(), id,
-                            [this](Slot slot, BallId other) { return ids_[slot] < other; });
+                            [this](Slot slot, BallId other) { return agendas_[slot].id < other; });
   }
   std::vector<Slot>::const_iterator find(BallId id) const {
     return const_cast<EventDriven*>(this)->find(id);
@@ -266,9 +255,7 @@ class EventDriven final : public Method {
     const std::size_t count = bodies_.size() + 1;
     bodies_.resize(count);
     agendas_.resize(count);
-    inverse_masses_.resize(count);
-    masses_.resize(count);
-    ids_.resize(count);
+    queue_.resize(count);
     histories_.resize(count);
     if constexpr (kGravity) {
       accelerations_.resize(count);
@@ -278,17 +265,45 @@ class EventDriven final : public Method {
     return static_cast<Slot>(count - 1);
   }
 
-  bool isFixed(Slot slot) const { return inverse_masses_[slot] == 0; }
+  bool isFixed(Slot slot) const { return std::isinf(agendas_[slot].mass); }
+  Real inverseMass(Slot slot) const { return 1 / Real(agendas_[slot].mass); }  // 1/kg; 0: fixed
 
   // Order of events at one instant: smaller id, then larger id; a crossing has no second partner.
-  std::pair<Partner, Partner> tieOrder(Slot slot) const {
+  std::pair<Partner, Partner> partners(Slot slot) const {
     const Agenda& agenda = agendas_[slot];
-    const Partner self = ids_[slot];
+    const Partner self = agenda.id;
     if (agenda.crossing_time < agenda.impact_time) return {self, self};
     const Partner other = agenda.partner >= kWall ? walls_[agenda.partner - kWall].partner
-                                                  : Partner{ids_[agenda.partner]};
+                                                  : Partner{agendas_[agenda.partner].id};
     return {std::min(self, other), std::max(self, other)};
   }
+
+  auto tieOrder() const {
+    return [this](Slot a, Slot b) { return partners(a) < partners(b); };
+  }
+
+  // Fetches from memory what balls that come up soon will need.
+  auto expectation() const {
+    return [this](Slot slot, std::uint32_t buckets_ahead) {
+      if (buckets_ahead == 2) {
+        __builtin_prefetch(&agendas_[slot]);
+        __builtin_prefetch(&bodies_[slot]);
+        return;
+      }
+      const Agenda& agenda = agendas_[slot];
+      grid_.prefetchNear(agenda.cell, agenda.level);
+      if (agenda.impact_time <= agenda.crossing_time && agenda.partner < kWall) {
+        __builtin_prefetch(&bodies_[agenda.partner]);
+        __builtin_prefetch(&agendas_[agenda.partner]);
+      }
+    };
+  }
+
+  Real due(Slot slot) const {
+    return std::min(agendas_[slot].impact_time, agendas_[slot].crossing_time);
+  }
+
+  void enqueue(Slot slot) { queue_.insert(slot, due(slot), tieOrder()); }
 
   // --- motion between events
 
@@ -356,19 +371,53 @@ class EventDriven final : public Method {
     std::vector<GridBall<Real>> balls;
     balls.reserve(slots_.size());
     for (const Slot slot : slots_) {
+      bringHome(slot);
       balls.push_back({positionNow(slot), bodies_[slot].radius});
     }
     grid_ = layOutGrid<Real>(surroundings_, balls);
-    grid_.resize(bodies_.size());
     coarsest_edge_ = coarsestEdge(grid_);
+    renumber(balls);
+    grid_.resize(bodies_.size());
     for (const Slot slot : slots_) place(slot);
     balls_at_layout_ = slots_.size();
+    collisions_at_layout_ = statistics_.ball_collisions;
     ready_ = true;
-    for (const Slot slot : slots_) {
-      agendas_[slot].links = {};
-      findNextEvent(slot, kNoSlot);
-    }
+    for (const Slot slot : slots_) findNextEvent(slot, kNoSlot);
     setCalendar(estimatedEventRate());
+  }
+
+  // Gives the balls new slots along a space-filling curve, so that neighbours in space are
+  // neighbours in memory.
+  void renumber(const std::vector<GridBall<Real>>& balls) {
+    struct Place {
+      std::uint64_t key;
+      std::uint32_t rank;  // in slots_
+    };
+    std::vector<Place> places;
+    places.reserve(slots_.size());
+    for (std::size_t i = 0; i < slots_.size(); ++i) {
+      const auto level = levelOf(balls[i].radius);
+      const int coarser = grid_.levels().back().depth() - grid_.levels()[level].depth();
+      places.push_back({mortonKey(grid_.coordinatesOf(balls[i].x, level), coarser),
+                        static_cast<std::uint32_t>(i)});
+    }
+    std::sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
+      return a.key != b.key ? a.key < b.key : a.rank < b.rank;
+    });
+    const auto reorder = [&](auto& values) {
+      if (values.empty()) return;
+      std::remove_reference_t<decltype(values)> ordered;
+      ordered.reserve(places.size());
+      for (const Place& place : places) ordered.push_back(values[slots_[place.rank]]);
+      values = std::move(ordered);
+    };
+    reorder(bodies_);
+    reorder(agendas_);
+    reorder(histories_);
+    reorder(accelerations_);
+    reorder(resting_);
+    free_slots_.clear();
+    for (std::size_t i = 0; i < places.size(); ++i) slots_[places[i].rank] = static_cast<Slot>(i);
   }
 
   // Events per second, from the times at which half of the balls have their next one.
@@ -391,11 +440,8 @@ class EventDriven final : public Method {
     const Real width = events_per_second > 0 ? kEventsPerBucket / events_per_second : Real(1);
     // Clocks restart with the calendar.
     shiftClocks(now_);
-    queue_.reset(floorToPowerOfTwo(width), buckets);
-    for (const Slot slot : slots_) {
-      agendas_[slot].links = {};
-      queue_.insert(*this, slot);
-    }
+    queue_.reset(floorToPowerOfTwo(width), buckets, bodies_.size());
+    for (const Slot slot : slots_) enqueue(slot);
     events_at_new_year_ = statistics_.events;
   }
 
@@ -422,7 +468,7 @@ class EventDriven final : public Method {
   // Moves all clocks back by whole years, to the next one in which anything happens.
   void turnYear(Real limit) {
     const Real year = queue_.yearLength();
-    const Real next = std::min(limit, queue_.earliestBeyond(*this));
+    const Real next = std::min(limit, queue_.earliestBeyond());
     const Real years = std::max(Real(1), std::floor(next / year));
     now_ = years * year;
     shiftClocks(now_);
@@ -430,8 +476,13 @@ class EventDriven final : public Method {
     for (const Slot slot : slots_) {
       if (bodies_[slot].time < -16 * year) settle(slot);
     }
-    queue_.turnYear(*this);
-    retuneCalendar(years);
+    queue_.turnYear(years * year, tieOrder());
+    // Balls that have mixed lie at random in memory again.
+    if (statistics_.ball_collisions - collisions_at_layout_ > kImpactsPerLayout * slots_.size()) {
+      layOut();
+    } else {
+      retuneCalendar(years);
+    }
   }
 
   void retuneCalendar(Real years) {
@@ -462,7 +513,7 @@ class EventDriven final : public Method {
   }
 
   void lift(Slot slot) {
-    queue_.remove(*this, slot);
+    queue_.remove(slot);
     grid_.unlink(slot, agendas_[slot].cell, agendas_[slot].level);
   }
 
@@ -487,6 +538,7 @@ class EventDriven final : public Method {
     const auto k = static_cast<std::size_t>(axis);
     const CellCoordinates before = agenda.cell;
     agenda.cell[k] += agenda.crossing_direction;
+    const CellCoordinates unwrapped = agenda.cell;
     if (period_[axis] > 0) {
       const std::int32_t count = grid_.count(k, agenda.level);
       if (agenda.cell[k] < 0) {
@@ -497,22 +549,23 @@ class EventDriven final : public Method {
         bodies_[slot].x[axis] -= period_[axis];
       }
     } else if (agenda.cell[k] > kFarthestCell || agenda.cell[k] < -kFarthestCell) {
-      throw std::range_error("ball " + std::to_string(ids_[slot]) + " has flown 2^30 cells away");
+      throw std::range_error("ball " + std::to_string(agendas_[slot].id) +
+                             " has flown 2^30 cells away");
     }
     grid_.move(slot, before, agenda.cell, agenda.level);
     Found found{agenda.impact_time, agenda.partner};
     const Real old_time = found.time;
-    grid_.gatherNewLayer(before, agenda.cell, agenda.level, k,
+    grid_.gatherNewLayer(before, unwrapped, agenda.cell, agenda.level, k,
                          agenda.crossing_direction > 0 ? 2 : 0, candidates_);
     considerCandidates(seekerAt(slot, kNoSlot), found);
     considerWallsOf(slot, found);
     if (found.time < old_time) setImpact(slot, found);
     findCrossing(slot);
-    queue_.insert(*this, slot);
+    enqueue(slot);
   }
 
   void meetBall(Slot first, Slot second) {
-    if (ids_[second] < ids_[first]) std::swap(first, second);
+    if (agendas_[second].id < agendas_[first].id) std::swap(first, second);
     settle(first);
     settle(second);
     Body& a = bodies_[first];
@@ -521,29 +574,32 @@ class EventDriven final : public Method {
     const Vec n = contactNormal<Real>(dx);
     const Real reach = a.radius + b.radius;
     Real e = restitution_;
+    Real least = 0;
+    if constexpr (kGravity) {
+      const Vec pressing = accelerations_[first] - accelerations_[second];
+      least = leastRebound<Real>(dot(pressing, n), reach);
+    }
     if (e < 1) {
       const Real speed = dot(a.v, n) - dot(b.v, n);
       const bool a_collapses = histories_[first].record(now_, speed, reach);
       const bool b_collapses = histories_[second].record(now_, speed, reach);
-      if (a_collapses || b_collapses) e = 1;
-    }
-    Real least = 0;
-    if constexpr (kGravity) {
-      least =
-          leastRebound<Real>(dot(Vec(accelerations_[first] - accelerations_[second]), n), reach);
+      if (a_collapses || b_collapses) {
+        e = 1;
+        least = std::max(least, collapseRebound<Real>(speedOf(a), speedOf(b)));
+      }
     }
     const Exchange<Real> passed =
-        collide<Real>(a.v, inverse_masses_[first], b.v, inverse_masses_[second], n, e, least);
+        collide<Real>(a.v, inverseMass(first), b.v, inverseMass(second), n, e, least);
     if (passed.impulse > 0) {
       ++statistics_.ball_collisions;
       statistics_.virial += double(passed.impulse * reach);
       noteOverlap(reach - dot(dx, n));
-      report(first, ids_[second], n, passed.impulse, passed.approach_speed);
+      report(first, agendas_[second].id, n, passed.impulse, passed.approach_speed);
     }
     velocityChanged(first);
     velocityChanged(second);
-    queue_.remove(*this, first);
-    queue_.remove(*this, second);
+    queue_.remove(first);
+    queue_.remove(second);
     search(first, second);
     search(second, first);
   }
@@ -556,9 +612,13 @@ class EventDriven final : public Method {
     if constexpr (kGravity) pull = dot(accelerations_[slot], wall.normal);
     const Real speed = -dot(body.v, wall.normal);
     Real e = restitution_;
-    if (e < 1 && !(pull < 0) && histories_[slot].record(now_, speed, body.radius)) e = 1;
+    Real least = 0;
+    if (e < 1 && !(pull < 0) && histories_[slot].record(now_, speed, body.radius)) {
+      e = 1;
+      least = collapseRebound<Real>(speedOf(body), Real(0));
+    }
     noteOverlap(wall.offset + body.radius - dot(body.x, wall.normal));
-    collideWithWall<Real>(body.v, wall.normal, e);
+    collideWithWall<Real>(body.v, wall.normal, e, least);
     if constexpr (kGravity) {
       if (comesToRest<Real>(dot(body.v, wall.normal), pull, body.radius)) {
         resting_[slot].add(static_cast<int>(index));
@@ -566,7 +626,8 @@ class EventDriven final : public Method {
     }
     if (speed > 0) {
       ++statistics_.wall_collisions;
-      report(slot, wall.partner, -wall.normal, (1 + e) * speed / inverse_masses_[slot], speed);
+      const Real change = std::max((1 + e) * speed, speed + least);
+      report(slot, wall.partner, -wall.normal, change * Real(agendas_[slot].mass), speed);
     }
     velocityChanged(slot);
     search(slot, kNoSlot);
@@ -577,20 +638,16 @@ class EventDriven final : public Method {
   void velocityChanged(Slot slot) {
     ++agendas_[slot].version;
     if constexpr (kGravity) {
-      RestingContacts& resting = resting_[slot];
-      if (resting.count == 0) return;
+      if (resting_[slot].count == 0) return;
       Body& body = bodies_[slot];
-      for (int i = resting.count - 1; i >= 0; --i) {
-        const Wall<Real>& wall = walls_[static_cast<std::size_t>(resting.walls[i])];
-        const Real speed = dot(body.v, wall.normal);
-        if (speed < 0 || !comesToRest<Real>(speed, dot(gravity_, wall.normal), body.radius)) {
-          resting.removeAt(i);
-        } else {
-          body.v -= speed * wall.normal;
-        }
-      }
-      accelerations_[slot] = constrainedAcceleration<Real>(gravity_, walls_, resting);
+      accelerations_[slot] =
+          settleContacts<Real>(resting_[slot], body.v, body.radius, gravity_, walls_);
     }
+  }
+
+  static Real speedOf(const Body& body) {
+    using std::sqrt;
+    return sqrt(dot(body.v, body.v));
   }
 
   // --- search for a ball's next event
@@ -599,7 +656,7 @@ class EventDriven final : public Method {
   // `just_met`: a partner it touches and has just parted from
   void search(Slot slot, Slot just_met) {
     findNextEvent(slot, just_met);
-    queue_.insert(*this, slot);
+    enqueue(slot);
   }
 
   void findNextEvent(Slot slot, Slot just_met) {
@@ -697,7 +754,8 @@ class EventDriven final : public Method {
   }
 
   bool isEarlierTie(Slot other, const Found& found) const {
-    return found.time < kNever<Real> && found.partner < kWall && ids_[other] < ids_[found.partner];
+    return found.time < kNever<Real> && found.partner < kWall &&
+           agendas_[other].id < agendas_[found.partner].id;
   }
 
   // Box faces are only met from the cells beside them; planes from anywhere.
@@ -798,7 +856,7 @@ class EventDriven final : public Method {
     if (log_ == nullptr) return;
     Collision collision;
     collision.time = origin_ + double(now_);
-    collision.a = ids_[slot];
+    collision.a = agendas_[slot].id;
     collision.b = b;
     collision.point = wrapped(bodies_[slot].x + bodies_[slot].radius * n).template cast<double>();
     collision.normal = n.template cast<double>();
@@ -808,6 +866,7 @@ class EventDriven final : public Method {
   }
 
   static constexpr Real kEventsPerBucket = 4;
+  static constexpr std::uint64_t kImpactsPerLayout = 8;  // ball-ball impacts per ball
   static constexpr std::int32_t kFarthestCell = 1 << 30;
 
   Surroundings surroundings_;
@@ -820,13 +879,10 @@ class EventDriven final : public Method {
   std::array<Vec, 27> image_shift_;           // m
 
   // One entry a slot; a slot is reused when its ball is removed.
-  std::vector<Body> bodies_;
-  std::vector<Agenda> agendas_;
-  std::vector<Real> inverse_masses_;  // 1/kg
-  std::vector<double> masses_;        // kg
-  std::vector<BallId> ids_;
+  HugePageVector<Body> bodies_;
+  HugePageVector<Agenda> agendas_;
   std::vector<ImpactHistory<Real>> histories_;
-  std::vector<Vec> accelerations_;  // m/s^2; only with gravity
+  HugePageVector<Vec> accelerations_;  // m/s^2; only with gravity
   std::vector<RestingContacts> resting_;
   std::vector<Slot> slots_;  // of the balls there are, by ascending id
   std::vector<Slot> free_slots_;
@@ -834,8 +890,9 @@ class EventDriven final : public Method {
   CellGrid<Real> grid_;
   Real coarsest_edge_ = 0;  // m, the shortest edge of a cell of the coarsest level
   std::size_t balls_at_layout_ = 0;
+  std::uint64_t collisions_at_layout_ = 0;
   bool ready_ = false;  // grid and queue hold all balls
-  EventQueue<Real, EventDriven> queue_;
+  EventQueue<Real> queue_;
   Candidates candidates_;              // scratch of a search
   PairBatch<Real> batch_;              // scratch of a search
   const Slot* batch_slots_ = nullptr;  // of the batch's lanes

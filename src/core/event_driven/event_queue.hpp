@@ -7,14 +7,17 @@
 // of links.
 //
 // Times are seconds since the year began. When the year turns the owner moves its clocks back by
-// yearLength(), a power of two, so that times stay small and fine however long the run is.
+// whole years, a power of two each, so that times stay small and fine however long the run is.
 #pragma once
 
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <vector>
+
+#include "event_driven/huge_page_vector.hpp"
 
 namespace ball_sim {
 
@@ -22,29 +25,19 @@ namespace ball_sim {
 using Slot = std::uint32_t;
 constexpr Slot kNoSlot = ~Slot{0};
 
-/// A ball's place in the queue.
-struct QueueLinks {
-  static constexpr std::int32_t kNotQueued = -1;
-  static constexpr std::int32_t kInHeap = -2;
-  static constexpr std::int32_t kBeyondYear = -3;
-
-  Slot next = kNoSlot;
-  Slot previous = kNoSlot;
-  std::int32_t bucket = kNotQueued;  ///< or one of the marks above
-};
-
-/// @tparam Entries  gives `Real due(Slot)`, the time of a ball's event; `QueueLinks& links(Slot)`;
-///                  and `bool before(Slot, Slot)`, the order of events at one instant
-template <class Real, class Entries>
+/// @tparam Real  double or long double
+template <class Real>
 class EventQueue {
  public:
   /// Forgets all entries and sets the calendar.
   /// @param bucket_width  s, a power of two
   /// @param buckets       a power of two
-  void reset(Real bucket_width, std::uint32_t buckets) {
+  /// @param slots         size of the owner's arrays
+  void reset(Real bucket_width, std::uint32_t buckets, std::size_t slots) {
     width_ = bucket_width;
     per_width_ = 1 / bucket_width;
     heads_.assign(buckets, kNoSlot);
+    entries_.assign(slots, Entry{});
     beyond_ = kNoSlot;
     current_ = 0;
     heap_.clear();
@@ -52,156 +45,177 @@ class EventQueue {
     in_year_ = 0;
   }
 
+  /// Makes room for slots up to `slots`.
+  void resize(std::size_t slots) { entries_.resize(slots); }
+
   Real yearLength() const { return width_ * Real(heads_.size()); }
   Real bucketWidth() const { return width_; }
   std::size_t bytes() const {
-    return heads_.capacity() * sizeof(Slot) + heap_.capacity() * sizeof(HeapEntry);
+    return heads_.capacity() * sizeof(Slot) + entries_.capacity() * sizeof(Entry) +
+           heap_.capacity() * sizeof(HeapEntry);
   }
 
-  /// Adds a ball that is not queued, at entries.due(slot) >= the time of the last event.
-  void insert(Entries& entries, Slot slot) {
-    const Real due = entries.due(slot);
+  /// Adds a ball that is not queued.
+  /// @param due     s in this year, not before the last event taken out
+  /// @param before  order of the balls' events at one instant, before(slot, slot)
+  template <class Before>
+  void insert(Slot slot, Real due, Before before) {
+    entries_[slot].due = due;
     const Real position = due * per_width_;
     if (!(position < Real(heads_.size()))) {
-      link(entries, slot, beyond_, QueueLinks::kBeyondYear);
+      link(slot, beyond_, kBeyondYear);
       return;
     }
     ++in_year_;
     const auto bucket = static_cast<std::uint32_t>(position);
     if (bucket <= current_) {
-      pushHeap(entries, slot, due);
+      entries_[slot].bucket = kInHeap;
+      heap_.push_back({due, slot});
+      std::push_heap(heap_.begin(), heap_.end(), later(before));
     } else {
-      link(entries, slot, heads_[bucket], static_cast<std::int32_t>(bucket));
+      link(slot, heads_[bucket], static_cast<std::int32_t>(bucket));
     }
   }
 
   /// Takes a ball out, queued or not.
-  void remove(Entries& entries, Slot slot) {
-    QueueLinks& links = entries.links(slot);
-    if (links.bucket == QueueLinks::kNotQueued) return;
-    if (links.bucket != QueueLinks::kBeyondYear) --in_year_;
-    if (links.bucket != QueueLinks::kInHeap) unlink(entries, links);
-    links.bucket = QueueLinks::kNotQueued;  // a heap entry that has lost its ball is skipped later
+  void remove(Slot slot) {
+    Entry& entry = entries_[slot];
+    if (entry.bucket == kNotQueued) return;
+    if (entry.bucket != kBeyondYear) --in_year_;
+    if (entry.bucket != kInHeap) unlink(entry);
+    entry.bucket = kNotQueued;  // what the heap holds of it is skipped later
   }
 
   /// The ball whose event is next, if that is due by `limit`; kNoSlot if not, or if the year is
   /// over. The ball stays queued.
-  Slot peek(Entries& entries, Real limit) {
+  /// @param expect  expect(slot, buckets ahead): a ball comes up in a bucket or two
+  template <class Before, class Expect>
+  Slot peek(Real limit, Before before, Expect expect) {
     while (true) {
       while (!heap_.empty()) {
         const HeapEntry& top = heap_.front();
-        if (isLive(entries, top)) return top.due <= limit ? top.slot : kNoSlot;
-        popHeap(entries);
+        if (isLive(top)) return top.due <= limit ? top.slot : kNoSlot;
+        popHeap(before);
       }
       if (in_year_ == 0 || current_ + 1 == heads_.size()) return kNoSlot;
       if (Real(current_ + 1) * width_ > limit) return kNoSlot;
       ++current_;
-      openBucket(entries);
+      openBucket(before, expect);
     }
   }
 
-  /// Takes out the ball that peek() just named.
-  void pop(Entries& entries) {
-    entries.links(heap_.front().slot).bucket = QueueLinks::kNotQueued;
+  /// Takes out the ball that peek() just named, and tells when it was due.
+  template <class Before>
+  Real pop(Before before) {
+    const HeapEntry top = heap_.front();
+    entries_[top.slot].bucket = kNotQueued;
     --in_year_;
-    popHeap(entries);
+    popHeap(before);
+    return top.due;
   }
 
-  /// Whether nothing is left to happen in this year.
-  bool yearIsEmpty() const { return in_year_ == 0; }
-
-  /// Begins a new year, after the owner has moved all times back; the year must be empty.
-  void turnYear(Entries& entries) {
+  /// Begins a new year `by` seconds later; this one must be empty.
+  /// @param by  whole years
+  template <class Before>
+  void turnYear(Real by, Before before) {
     assert(in_year_ == 0);
     current_ = 0;
     heap_.clear();
     Slot slot = beyond_;
     beyond_ = kNoSlot;
     while (slot != kNoSlot) {
-      QueueLinks& links = entries.links(slot);
-      const Slot next = links.next;
-      links.bucket = QueueLinks::kNotQueued;
-      insert(entries, slot);
+      Entry& entry = entries_[slot];
+      const Slot next = entry.next;
+      entry.bucket = kNotQueued;
+      insert(slot, entry.due - by, before);
       slot = next;
     }
   }
 
   /// The earliest time of all events beyond the year; infinity when there are none.
-  Real earliestBeyond(Entries& entries) const {
-    Real earliest = kNever<Real>;
-    for (Slot slot = beyond_; slot != kNoSlot; slot = entries.links(slot).next) {
-      earliest = std::min(earliest, entries.due(slot));
+  Real earliestBeyond() const {
+    Real earliest = std::numeric_limits<Real>::infinity();
+    for (Slot slot = beyond_; slot != kNoSlot; slot = entries_[slot].next) {
+      earliest = std::min(earliest, entries_[slot].due);
     }
     return earliest;
   }
 
  private:
+  static constexpr std::int32_t kNotQueued = -1;
+  static constexpr std::int32_t kInHeap = -2;
+  static constexpr std::int32_t kBeyondYear = -3;
+
+  struct Entry {
+    Real due = 0;  // s, in this year
+    Slot next = kNoSlot;
+    Slot previous = kNoSlot;
+    std::int32_t bucket = kNotQueued;  // or one of the marks above
+  };
+
   struct HeapEntry {
     Real due;
     Slot slot;
   };
 
-  // The heap's top is the earliest; the entries decide among equal times.
-  struct Later {
-    Entries& entries;
-    bool operator()(const HeapEntry& a, const HeapEntry& b) const {
-      if (a.due != b.due) return a.due > b.due;
-      return entries.before(b.slot, a.slot);
-    }
-  };
-
-  bool isLive(Entries& entries, const HeapEntry& entry) const {
-    return entries.links(entry.slot).bucket == QueueLinks::kInHeap &&
-           entries.due(entry.slot) == entry.due;
+  // The heap's top is the earliest.
+  template <class Before>
+  static auto later(Before before) {
+    return [before](const HeapEntry& a, const HeapEntry& b) {
+      return a.due != b.due ? a.due > b.due : before(b.slot, a.slot);
+    };
   }
 
-  void pushHeap(Entries& entries, Slot slot, Real due) {
-    entries.links(slot).bucket = QueueLinks::kInHeap;
-    heap_.push_back({due, slot});
-    std::push_heap(heap_.begin(), heap_.end(), Later{entries});
+  bool isLive(const HeapEntry& top) const {
+    const Entry& entry = entries_[top.slot];
+    return entry.bucket == kInHeap && entry.due == top.due;
   }
 
-  void popHeap(Entries& entries) {
-    std::pop_heap(heap_.begin(), heap_.end(), Later{entries});
+  template <class Before>
+  void popHeap(Before before) {
+    std::pop_heap(heap_.begin(), heap_.end(), later(before));
     heap_.pop_back();
   }
 
-  void openBucket(Entries& entries) {
-    Slot slot = heads_[current_];
-    heads_[current_] = kNoSlot;
-    while (slot != kNoSlot) {
-      QueueLinks& links = entries.links(slot);
-      links.bucket = QueueLinks::kInHeap;
-      heap_.push_back({entries.due(slot), slot});
-      slot = links.next;
+  template <class Before, class Expect>
+  void openBucket(Before before, Expect expect) {
+    for (std::uint32_t ahead = 1; ahead <= 2; ++ahead) {
+      if (current_ + ahead >= heads_.size()) break;
+      for (Slot s = heads_[current_ + ahead]; s != kNoSlot; s = entries_[s].next) expect(s, ahead);
     }
-    std::make_heap(heap_.begin(), heap_.end(), Later{entries});
+    for (Slot slot = heads_[current_]; slot != kNoSlot; slot = entries_[slot].next) {
+      entries_[slot].bucket = kInHeap;
+      heap_.push_back({entries_[slot].due, slot});
+    }
+    heads_[current_] = kNoSlot;
+    std::make_heap(heap_.begin(), heap_.end(), later(before));
   }
 
-  void link(Entries& entries, Slot slot, Slot& head, std::int32_t bucket) {
-    QueueLinks& links = entries.links(slot);
-    links.bucket = bucket;
-    links.previous = kNoSlot;
-    links.next = head;
-    if (head != kNoSlot) entries.links(head).previous = slot;
+  void link(Slot slot, Slot& head, std::int32_t bucket) {
+    Entry& entry = entries_[slot];
+    entry.bucket = bucket;
+    entry.previous = kNoSlot;
+    entry.next = head;
+    if (head != kNoSlot) entries_[head].previous = slot;
     head = slot;
   }
 
-  void unlink(Entries& entries, const QueueLinks& links) {
-    if (links.next != kNoSlot) entries.links(links.next).previous = links.previous;
-    if (links.previous != kNoSlot) {
-      entries.links(links.previous).next = links.next;
-    } else if (links.bucket == QueueLinks::kBeyondYear) {
-      beyond_ = links.next;
+  void unlink(const Entry& entry) {
+    if (entry.next != kNoSlot) entries_[entry.next].previous = entry.previous;
+    if (entry.previous != kNoSlot) {
+      entries_[entry.previous].next = entry.next;
+    } else if (entry.bucket == kBeyondYear) {
+      beyond_ = entry.next;
     } else {
-      heads_[static_cast<std::size_t>(links.bucket)] = links.next;
+      heads_[static_cast<std::size_t>(entry.bucket)] = entry.next;
     }
   }
 
   Real width_ = 1;
   Real per_width_ = 1;
-  std::vector<Slot> heads_;  // of the buckets' lists
-  Slot beyond_ = kNoSlot;    // head of the list of events beyond the year
+  HugePageVector<Slot> heads_;     // of the buckets' lists
+  HugePageVector<Entry> entries_;  // by slot
+  Slot beyond_ = kNoSlot;          // head of the list of events beyond the year
   std::uint32_t current_ = 0;
   std::vector<HeapEntry> heap_;  // events of the current bucket and those that came late into it
   std::size_t in_year_ = 0;      // events in buckets and heap
