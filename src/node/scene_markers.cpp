@@ -75,6 +75,7 @@ class Builder {
         extent_(extentOf(surroundings, balls, radii)),
         frame_id_(std::move(frame_id)) {
     largest_radius_ = radii.empty() ? 0.05 : *std::max_element(radii.begin(), radii.end());
+    table_ = tableArea();
   }
 
   visualization_msgs::MarkerArray build() {
@@ -125,19 +126,26 @@ class Builder {
   double tableThickness() const { return 0.02 * longerSide(); }
 
   /// As wide as cushions look right, m.
-  double cushionWidth() const { return std::max(0.02 * longerSide(), largest_radius_); }
+  double cushionWidth() const {
+    return std::clamp(largest_radius_, 0.02 * longerSide(), 0.04 * longerSide());
+  }
 
-  void addTable() {
-    // An open side gets a margin, so that balls do not start on the edge.
-    Extent top = extent_;
+  /// The playing area. An open side gets a margin, so that balls do not start on the edge.
+  Extent tableArea() const {
+    Extent area = extent_;
     for (int axis = 0; axis < 2; ++axis) {
       const double margin = 0.5 * std::max(extent_.size()[axis], 0.4 * longerSide());
-      top.min[axis] -= closed(axis, false) || surroundings_.periodic ? 0 : margin;
-      top.max[axis] += closed(axis, true) || surroundings_.periodic ? 0 : margin;
+      area.min[axis] -= closed(axis, false) || surroundings_.periodic ? 0 : margin;
+      area.max[axis] += closed(axis, true) || surroundings_.periodic ? 0 : margin;
     }
+    return area;
+  }
+
+  void addTable() {
     const double thickness = tableThickness();
-    addBlock("table", kCloth, {top.centre().x(), top.centre().y(), tableTop() - thickness / 2},
-             {top.size().x(), top.size().y(), thickness});
+    addBlock("table", kCloth,
+             {table_.centre().x(), table_.centre().y(), tableTop() - thickness / 2},
+             {table_.size().x(), table_.size().y(), thickness});
   }
 
   void addCushions() {
@@ -161,13 +169,13 @@ class Builder {
     const double width = cushionWidth();
     const auto corner = [&](double end, double outwards) {
       Vector3 point;
-      point[axis] = upper ? extent_.max[axis] + outwards : extent_.min[axis] - outwards;
+      point[axis] = upper ? table_.max[axis] + outwards : table_.min[axis] - outwards;
       point[along] = end;
       point.z() = tableTop() + cushionHeight() * outwards / width;
       return point;
     };
-    const double low = extent_.min[along];
-    const double high = extent_.max[along];
+    const double low = table_.min[along];
+    const double high = table_.max[along];
     std::array<Vector3, 4> corners{corner(low, 0), corner(high, 0), corner(high + width, width),
                                    corner(low - width, width)};
     if ((corners[1] - corners[0]).cross(corners[2] - corners[0]).z() < 0) {
@@ -187,13 +195,13 @@ class Builder {
     const double width = 1.6 * offset;
     const double top = tableTop() + 1.1 * cushionHeight();
     const double bottom = tableTop() - tableThickness();
-    Vector3 centre = extent_.centre();
+    Vector3 centre = table_.centre();
     centre[axis] =
-        upper ? extent_.max[axis] + offset + width / 2 : extent_.min[axis] - offset - width / 2;
+        upper ? table_.max[axis] + offset + width / 2 : table_.min[axis] - offset - width / 2;
     centre.z() = (top + bottom) / 2;
     Vector3 size;
     size[axis] = width;
-    size[along] = extent_.size()[along] + 2 * offset + (axis == 0 ? 2 * width : 0);
+    size[along] = table_.size()[along] + 2 * offset + (axis == 0 ? 2 * width : 0);
     size.z() = top - bottom;
     addBlock("rails", kWood, centre, size);
   }
@@ -265,6 +273,7 @@ class Builder {
   const Extent extent_;
   const std::string frame_id_;
   double largest_radius_ = 0;  // m
+  Extent table_;               // of a planar scene
   visualization_msgs::MarkerArray array_;
 };
 

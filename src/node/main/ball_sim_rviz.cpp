@@ -1,0 +1,125 @@
+// ball_sim_rviz: RViz with a given configuration, its camera moved to where the balls are.
+//
+// Scenes differ in size by far more than one view can serve, and RViz takes a view only from its
+// configuration. So this waits for the first markers, writes the configuration anew into a
+// temporary file, and becomes RViz.
+#include <ros/callback_queue.h>
+#include <ros/console.h>
+#include <ros/init.h>
+#include <ros/node_handle.h>
+#include <unistd.h>
+#include <visualization_msgs/MarkerArray.h>
+#include <yaml-cpp/yaml.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <exception>
+#include <fstream>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "camera.hpp"
+
+namespace ball_sim {
+namespace {
+
+constexpr std::chrono::seconds kPatience(10);  // then without the markers
+constexpr double kAspect = 1.3;                // of RViz's picture in the window as configured
+constexpr double kMargin = 1.03;               // around the scene
+constexpr double kLowPitch = 0.4;              // rad, for what is not flat
+
+/// What is drawn, as soon as there are balls; nothing when none come.
+std::optional<Bounds> awaitBounds() {
+  ros::CallbackQueue queue;
+  ros::NodeHandle node("ball_sim");
+  node.setCallbackQueue(&queue);
+  visualization_msgs::MarkerArray balls;
+  visualization_msgs::MarkerArray surroundings;
+  using Markers = visualization_msgs::MarkerArray;
+  const auto keep = [](Markers& kept) {
+    return boost::function<void(const Markers&)>([&kept](const Markers& m) { kept = m; });
+  };
+  const auto ball_subscriber = node.subscribe<Markers>("markers", 1, keep(balls));
+  const auto scene_subscriber = node.subscribe<Markers>("scene_markers", 1, keep(surroundings));
+  const auto deadline = std::chrono::steady_clock::now() + kPatience;
+  while (ros::ok() && balls.markers.empty() && std::chrono::steady_clock::now() < deadline) {
+    queue.callAvailable(ros::WallDuration(0.1));
+  }
+  Bounds bounds;
+  bounds.include(balls);
+  bounds.include(surroundings);
+  return bounds.empty() ? std::nullopt : std::optional<Bounds>(bounds);
+}
+
+/// Points the current view of an RViz configuration at the bounds.
+void aim(YAML::Node config, const Bounds& bounds) {
+  YAML::Node view = config["Visualization Manager"]["Views"]["Current"];
+  const Vector3 size = bounds.max() - bounds.min();
+  const bool flat = size.z() < 0.3 * std::max(size.x(), size.y());
+  const double pitch = flat ? view["Pitch"].as<double>() : kLowPitch;
+  const Camera camera = cameraFor(bounds, view["Yaw"].as<double>(), pitch,
+                                  view["Field of View"].as<double>(), kAspect);
+  view["Pitch"] = pitch;
+  view["Distance"] = kMargin * camera.distance;
+  view["Near Clip Distance"] = 0.001 * camera.distance;
+  view["Focal Point"]["X"] = camera.focus.x();
+  view["Focal Point"]["Y"] = camera.focus.y();
+  view["Focal Point"]["Z"] = camera.focus.z();
+}
+
+/// @return path of a new file
+std::string writeTemporary(const YAML::Node& config) {
+  std::string path = "/tmp/ball_sim_XXXXXX.rviz";
+  const int file = mkstemps(path.data(), 5);
+  if (file < 0) {
+    throw std::runtime_error("cannot write " + path);
+  }
+  close(file);
+  std::ofstream(path) << config << '\n';
+  return path;
+}
+
+/// @return path of the configuration to use
+std::string prepare(const std::string& path) {
+  const auto bounds = awaitBounds();
+  if (!bounds) {
+    return path;
+  }
+  const YAML::Node config = YAML::LoadFile(path);
+  aim(config, *bounds);
+  return writeTemporary(config);
+}
+
+}  // namespace
+}  // namespace ball_sim
+
+int main(int argc, char** argv) {
+  const std::vector<std::string> arguments(argv, argv + argc);
+  ros::init(argc, argv, "ball_sim_rviz", ros::init_options::AnonymousName);
+  if (argc != 2) {
+    ROS_FATAL("usage: ball_sim_rviz CONFIGURATION.rviz");
+    return 2;
+  }
+  std::string config = argv[1];
+  {
+    const ros::NodeHandle keeps_log;
+    try {
+      config = ball_sim::prepare(config);
+    } catch (const std::exception& error) {
+      ROS_WARN_STREAM("RViz starts with its view unchanged: " << error.what());
+    }
+    if (!ros::ok()) {
+      return 0;
+    }
+  }
+  // RViz gets what roslaunch says, such as its name; only the configuration is replaced.
+  std::vector<char*> rviz{const_cast<char*>("rviz"), const_cast<char*>("-d"), config.data()};
+  for (std::size_t i = 2; i < arguments.size(); ++i) {
+    rviz.push_back(const_cast<char*>(arguments[i].c_str()));
+  }
+  rviz.push_back(nullptr);
+  execvp("rviz", rviz.data());
+  perror("rviz");
+  return 1;
+}
