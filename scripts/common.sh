@@ -102,14 +102,16 @@ http://wiki.ros.org/noetic/Installation/Ubuntu, steps 1.2 and 1.3."
 
 # Of apt's thousands of lines, what tells how far it is.
 show_apt_progress() {
-  local line total='' count=0
+  local line packages=0 steps=0
   while read -r line; do
     case $line in
-      *' newly installed,'*) total=${line% newly installed,*} total=${total##* } ;;
+      *' newly installed,'*) packages=${line% newly installed,*} packages=${packages##* } ;;
       'Need to get '* | 'After this operation'* | 'Fetched '*) printf '     %s\n' "$line" ;;
-      'Setting up '*)
-        count=$((count + 1))
-        if ((count % 50 == 0)); then printf '     %s of %s set up\n' "$count" "$total"; fi
+      'Unpacking '* | 'Setting up '*)
+        steps=$((steps + 1))
+        if ((steps % 100 == 0)); then
+          printf '     %s of %s steps done\n' "$steps" $((2 * packages))
+        fi
         ;;
     esac
   done
