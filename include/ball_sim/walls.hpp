@@ -111,10 +111,33 @@ VectorOf<Real> constrainedAcceleration(const VectorOf<Real>& gravity,
   return nearest;
 }
 
+/// The part of a velocity that runs along all of the contacts' walls.
+/// @param v  m/s
+template <class Real>
+VectorOf<Real> velocityAlong(const VectorOf<Real>& v, const std::vector<Wall<Real>>& walls,
+                             const RestingContacts& contacts) {
+  const auto normal = [&](int i) {
+    return walls[static_cast<std::size_t>(contacts.walls[i])].normal;
+  };
+  constexpr Real kParallel = Real(1e-9);  // of two unit vectors: nearer than any real wedge
+  if (contacts.count == 0) return v;
+  for (int i = 1; i < contacts.count; ++i) {
+    const VectorOf<Real> edge = normal(0).cross(normal(i));
+    const Real squared = dot(edge, edge);
+    if (!(squared > kParallel * kParallel)) continue;
+    for (int j = i + 1; j < contacts.count; ++j) {
+      const Real out_of_edge = dot(edge, normal(j));
+      if (out_of_edge * out_of_edge > kParallel * kParallel) return VectorOf<Real>::Zero();
+    }
+    return (dot(v, edge) / squared) * edge;
+  }
+  return v - dot(v, normal(0)) * normal(0);
+}
+
 /// What a change of its velocity does to a ball that rests on walls: it leaves those it moves away
 /// from or into (into: the impact is still to come), and those that no longer press on it; along
 /// the others it slides.
-/// @param v  m/s; what rounding has left across the walls is taken out
+/// @param v  m/s; what is left across the walls rested on, less than a bounce, is taken out
 /// @return the ball's acceleration from now on, m/s^2
 template <class Real>
 VectorOf<Real> settleContacts(RestingContacts& contacts, VectorOf<Real>& v, Real radius,
@@ -125,17 +148,13 @@ VectorOf<Real> settleContacts(RestingContacts& contacts, VectorOf<Real>& v, Real
   };
   const Real weight = sqrt(dot(gravity, gravity));
   for (int i = contacts.count - 1; i >= 0; --i) {
-    const Real speed = dot(v, normal(i));
-    if (comesToRest<Real>(speed, -weight, radius)) {
-      v -= speed * normal(i);
-    } else {
-      contacts.removeAt(i);
-    }
+    if (!comesToRest<Real>(dot(v, normal(i)), -weight, radius)) contacts.removeAt(i);
   }
   const VectorOf<Real> a = constrainedAcceleration<Real>(gravity, walls, contacts);
   for (int i = contacts.count - 1; i >= 0; --i) {
     if (dot(a, normal(i)) > Real(1e-12) * weight) contacts.removeAt(i);
   }
+  v = velocityAlong<Real>(v, walls, contacts);
   return a;
 }
 
