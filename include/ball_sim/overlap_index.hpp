@@ -33,6 +33,10 @@ class OverlapIndex {
   /// to kTouchSlack of the sum of radii is no overlap.
   std::optional<std::size_t> find(const Vector3& position, double radius) const;
 
+  /// The numbers of all balls that one at `position` with `radius` would overlap, in no order.
+  /// @param numbers  overwritten
+  void findAll(const Vector3& position, double radius, std::vector<std::size_t>& numbers) const;
+
   /// The same question, yes or no: quicker.
   bool overlapsAny(const Vector3& position, double radius) const;
 

@@ -1,7 +1,6 @@
 // What a single ball must be to be let in, whoever asks.
 #include "ball_sim/ball_check.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -61,8 +60,11 @@ double wallSlack(double radius, double magnitude) {
 }
 
 Refusal sticksOut(const std::string& wall, double depth) {
-  return refusal(RefusalCode::outside, "position puts the ball outside: it sticks out " +
-                                           formatNumber(depth) + " m beyond " + wall);
+  char metres[32];
+  std::snprintf(metres, sizeof metres, "%.6g", depth);  // a difference: its last digits are noise
+  return refusal(
+      RefusalCode::outside,
+      std::string("position puts the ball outside: it sticks out ") + metres + " m beyond " + wall);
 }
 
 Refusal checkBox(const Vector3& position, double radius, const Surroundings& surroundings) {

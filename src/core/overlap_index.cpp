@@ -161,6 +161,15 @@ std::optional<std::size_t> OverlapIndex::find(const Vector3& position, double ra
   return smallest;
 }
 
+void OverlapIndex::findAll(const Vector3& position, double radius,
+                           std::vector<std::size_t>& numbers) const {
+  numbers.clear();
+  search(position, radius, [&numbers](const Entry& entry) {
+    numbers.push_back(entry.number);
+    return false;
+  });
+}
+
 bool OverlapIndex::overlapsAny(const Vector3& position, double radius) const {
   bool any = false;
   search(position, radius, [&any](const Entry&) { return any = true; });
