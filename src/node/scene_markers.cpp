@@ -26,7 +26,7 @@ std_msgs::ColorRGBA rgba(float red, float green, float blue, float alpha = 1) {
 const std_msgs::ColorRGBA kCloth = rgba(0.06F, 0.58F, 0.34F);
 const std_msgs::ColorRGBA kCushion = rgba(0.05F, 0.50F, 0.29F);
 const std_msgs::ColorRGBA kWood = rgba(0.50F, 0.27F, 0.13F);
-const std_msgs::ColorRGBA kFloor = rgba(0.42F, 0.45F, 0.50F);
+const std_msgs::ColorRGBA kFloor = rgba(0.70F, 0.73F, 0.78F);
 const std_msgs::ColorRGBA kWall = rgba(0.45F, 0.50F, 0.55F, 0.35F);
 const std_msgs::ColorRGBA kEdge = rgba(0.75F, 0.78F, 0.82F);
 

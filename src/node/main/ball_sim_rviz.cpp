@@ -25,9 +25,9 @@ namespace ball_sim {
 namespace {
 
 constexpr std::chrono::seconds kPatience(10);  // then without the markers
-constexpr double kAspect = 1.3;                // of RViz's picture in the window as configured
+constexpr double kAspect = 1.38;               // of RViz's picture in the window as configured
 constexpr double kMargin = 1.03;               // around the scene
-constexpr double kLowPitch = 0.4;              // rad, for what is not flat
+constexpr double kLowPitch = 0.45;             // rad, for what is not flat
 
 /// What is drawn, as soon as there are balls; nothing when none come.
 std::optional<Bounds> awaitBounds() {
