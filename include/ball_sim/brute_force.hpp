@@ -147,6 +147,7 @@ class BruteForce final : public Method {
     std::size_t a = 0;       // index of the ball
     std::size_t b = 0;       // index of the other ball, or of the wall
     bool with_wall = false;
+    Vec image = Vec::Zero();  // from a to the image of b that it meets, as of now, m
   };
 
   typename std::vector<Body>::iterator find(BallId id) {
@@ -170,10 +171,13 @@ class BruteForce final : public Method {
     }
   }
 
-  Vec nearestImage(Vec dx) const {
+  Vec nearestImage(const Vec& dx) const { return imageNear(dx, Vec::Zero()); }
+
+  // The image of dx that lies nearest to `expected`.
+  Vec imageNear(Vec dx, const Vec& expected) const {
     using std::floor;
     for (int axis = 0; axis < periodicAxes(); ++axis) {
-      dx[axis] -= floor(dx[axis] / edge(axis) + Real(0.5)) * edge(axis);
+      dx[axis] -= floor((dx[axis] - expected[axis]) / edge(axis) + Real(0.5)) * edge(axis);
     }
     return dx;
   }
@@ -199,7 +203,7 @@ class BruteForce final : public Method {
     for (std::size_t a = 0; a < bodies_.size(); ++a) {
       for (std::size_t k = 0; k < walls_.size(); ++k) {
         const Real dt = wallTime(bodies_[a], k);
-        if (dt < first.dt) first = {dt, a, k, true};
+        if (dt < first.dt) first = {dt, a, k, true, Vec::Zero()};
       }
       for (std::size_t b = a + 1; b < bodies_.size(); ++b) considerPair(a, b, first);
     }
@@ -227,7 +231,7 @@ class BruteForce final : public Method {
           if (j != 0) image[1] += j * edge(1);
           if (k != 0) image[2] += k * edge(2);
           const Real dt = pairTime(bodies_[a], bodies_[b], image);
-          if (dt < first.dt) first = {dt, a, b, false};
+          if (dt < first.dt) first = {dt, a, b, false, image};
         }
       }
     }
@@ -274,12 +278,15 @@ class BruteForce final : public Method {
     if (event.with_wall) {
       resolveWall(bodies_[event.a], static_cast<int>(event.b));
     } else {
-      resolvePair(bodies_[event.a], bodies_[event.b]);
+      Body& a = bodies_[event.a];
+      Body& b = bodies_[event.b];
+      const Vec dv = (b.v - a.v) - (event.dt / 2) * (b.a - a.a);  // the mean over the flight
+      resolvePair(a, b, imageNear(b.x - a.x, event.image + event.dt * dv));
     }
   }
 
-  void resolvePair(Body& a, Body& b) {
-    const Vec dx = nearestImage(b.x - a.x);
+  // `dx`: from a to the image of b that it meets.
+  void resolvePair(Body& a, Body& b, const Vec& dx) {
     const Vec n = contactNormal<Real>(dx);
     const Real reach = a.radius + b.radius;
     const Real speed = dot(a.v, n) - dot(b.v, n);
