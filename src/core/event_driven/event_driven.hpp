@@ -77,7 +77,7 @@ class EventDriven final : public Method {
     agendas_[slot].mass = ball.mass;
     agendas_[slot].id = id;
     slots_.push_back(slot);
-    histories_[slot] = {};
+    if (restitution_ < 1) histories_[slot] = {};
     if constexpr (kGravity) {
       accelerations_[slot] = isFixed(slot) ? Vec(Vec::Zero()) : gravity_;
       resting_[slot] = {};
@@ -86,7 +86,7 @@ class EventDriven final : public Method {
     if (slots_.size() > 2 * balls_at_layout_ + 16 || !fits(body)) ready_ = false;
     if (ready_) {
       place(slot);
-      search(slot, kNoSlot);
+      search(slot);
     }
   }
 
@@ -113,7 +113,7 @@ class EventDriven final : public Method {
     }
     if (ready_) {
       place(slot);
-      search(slot, kNoSlot);
+      search(slot);
     }
   }
 
@@ -124,7 +124,7 @@ class EventDriven final : public Method {
     velocityChanged(slot);
     if (ready_) {
       queue_.remove(slot);
-      search(slot, kNoSlot);
+      search(slot);
     }
   }
 
@@ -226,6 +226,12 @@ class EventDriven final : public Method {
 
   static constexpr std::uint32_t kWall = 0xF8000000;
 
+  // The ball that another has parted from at this instant.
+  struct JustMet {
+    Slot partner = kNoSlot;
+    Vec normal = Vec::Zero();  // towards it
+  };
+
   struct Found {
     Real time = kNever<Real>;  // s, in this year
     std::uint32_t partner = 0;
@@ -256,7 +262,7 @@ class EventDriven final : public Method {
     bodies_.resize(count);
     agendas_.resize(count);
     queue_.resize(count);
-    histories_.resize(count);
+    if (restitution_ < 1) histories_.resize(count);
     if constexpr (kGravity) {
       accelerations_.resize(count);
       resting_.resize(count);
@@ -282,19 +288,27 @@ class EventDriven final : public Method {
     return [this](Slot a, Slot b) { return partners(a) < partners(b); };
   }
 
-  // Fetches from memory what balls that come up soon will need.
-  auto expectation() const {
+  // Fetches from memory what balls that come up soon will need: each step needs what the one
+  // before has fetched.
+  auto expectation() {
     return [this](Slot slot, std::uint32_t buckets_ahead) {
-      if (buckets_ahead == 2) {
+      if (buckets_ahead == EventQueue<Real>::kSoon) {
         __builtin_prefetch(&agendas_[slot]);
         __builtin_prefetch(&bodies_[slot]);
         return;
       }
       const Agenda& agenda = agendas_[slot];
-      grid_.prefetchNear(agenda.cell, agenda.level);
-      if (agenda.impact_time <= agenda.crossing_time && agenda.partner < kWall) {
-        __builtin_prefetch(&bodies_[agenda.partner]);
-        __builtin_prefetch(&agendas_[agenda.partner]);
+      if (buckets_ahead == EventQueue<Real>::kSooner) {
+        grid_.prefetchNear(agenda.cell, agenda.level);
+        if (agenda.impact_time <= agenda.crossing_time && agenda.partner < kWall) {
+          __builtin_prefetch(&bodies_[agenda.partner]);
+          __builtin_prefetch(&agendas_[agenda.partner]);
+        }
+      } else {
+        grid_.gatherNear(agenda.cell, agenda.level, candidates_);
+        for (std::size_t i = 0; i < candidates_.count; ++i) {
+          __builtin_prefetch(&bodies_[candidates_.slots[i]]);
+        }
       }
     };
   }
@@ -382,7 +396,7 @@ class EventDriven final : public Method {
     balls_at_layout_ = slots_.size();
     collisions_at_layout_ = statistics_.ball_collisions;
     ready_ = true;
-    for (const Slot slot : slots_) findNextEvent(slot, kNoSlot);
+    for (const Slot slot : slots_) findNextEvent(slot);
     setCalendar(estimatedEventRate());
   }
 
@@ -433,10 +447,10 @@ class EventDriven final : public Method {
     return Real(0.7) * Real(waits.size()) / *middle;
   }
 
-  // A year of about four events a ball, a bucket of a few events.
+  // A year of about two events a ball, a bucket of about one event.
   void setCalendar(Real events_per_second) {
     std::uint32_t buckets = 64;
-    while (buckets < slots_.size()) buckets *= 2;
+    while (buckets < 2 * slots_.size()) buckets *= 2;
     const Real width = events_per_second > 0 ? kEventsPerBucket / events_per_second : Real(1);
     // Clocks restart with the calendar.
     shiftClocks(now_);
@@ -461,7 +475,7 @@ class EventDriven final : public Method {
       bodies_[slot].time -= by;
       agendas_[slot].impact_time -= by;
       agendas_[slot].crossing_time -= by;
-      histories_[slot].last -= by;
+      if (restitution_ < 1) histories_[slot].last -= by;
     }
   }
 
@@ -528,7 +542,7 @@ class EventDriven final : public Method {
     } else if (agendas_[agenda.partner].version == agenda.partner_version) {
       meetBall(slot, agenda.partner);
     } else {
-      search(slot, kNoSlot);
+      search(slot);
     }
   }
 
@@ -557,7 +571,7 @@ class EventDriven final : public Method {
     const Real old_time = found.time;
     grid_.gatherNewLayer(before, unwrapped, agenda.cell, agenda.level, k,
                          agenda.crossing_direction > 0 ? 2 : 0, candidates_);
-    considerCandidates(seekerAt(slot, kNoSlot), found);
+    considerCandidates(seekerAt(slot, {}), found);
     considerWallsOf(slot, found);
     if (found.time < old_time) setImpact(slot, found);
     findCrossing(slot);
@@ -600,8 +614,8 @@ class EventDriven final : public Method {
     velocityChanged(second);
     queue_.remove(first);
     queue_.remove(second);
-    search(first, second);
-    search(second, first);
+    search(first, {second, n});
+    search(second, {first, -n});
   }
 
   void meetWall(Slot slot, std::uint32_t index) {
@@ -630,7 +644,7 @@ class EventDriven final : public Method {
       report(slot, wall.partner, -wall.normal, change * Real(agendas_[slot].mass), speed);
     }
     velocityChanged(slot);
-    search(slot, kNoSlot);
+    search(slot);
   }
 
   // After any change of velocity: events found with the old one are stale; walls rested on are
@@ -653,17 +667,16 @@ class EventDriven final : public Method {
   // --- search for a ball's next event
 
   // Finds the next event of a ball that is not queued, and queues it.
-  // `just_met`: a partner it touches and has just parted from
-  void search(Slot slot, Slot just_met) {
-    findNextEvent(slot, just_met);
+  void search(Slot slot, const JustMet& met = {}) {
+    findNextEvent(slot, met);
     enqueue(slot);
   }
 
-  void findNextEvent(Slot slot, Slot just_met) {
+  void findNextEvent(Slot slot, const JustMet& met = {}) {
     const Agenda& agenda = agendas_[slot];
     Found found;
     grid_.gatherNear(agenda.cell, agenda.level, candidates_);
-    considerCandidates(seekerAt(slot, just_met), found);
+    considerCandidates(seekerAt(slot, met), found);
     considerWallsOf(slot, found);
     setImpact(slot, found);
     findCrossing(slot);
@@ -680,14 +693,14 @@ class EventDriven final : public Method {
   // One ball, as it is now, in search of its next impact.
   struct Seeker {
     Slot slot;
-    Slot just_met;
+    JustMet met;
     Vec x;        // m
     Vec v;        // m/s
     Real radius;  // m
   };
 
-  Seeker seekerAt(Slot slot, Slot just_met) const {
-    return {slot, just_met, positionNow(slot), velocityNow(slot), bodies_[slot].radius};
+  Seeker seekerAt(Slot slot, const JustMet& met) const {
+    return {slot, met, positionNow(slot), velocityNow(slot), bodies_[slot].radius};
   }
 
   // Takes the earliest impact with any of the candidates, if it is earlier than `found`. The ball
@@ -731,12 +744,12 @@ class EventDriven final : public Method {
     }
   }
 
-  // In straight relative motion two balls that touch and have just met do not meet again.
+  // In straight relative motion two balls that have just met do not meet again. In a periodic box
+  // another image of the partner may be in reach too, but not in the same direction.
   bool justParted(const Seeker& seeker, std::size_t i) const {
-    if (batch_slots_[i] != seeker.just_met) return false;
+    if (batch_slots_[i] != seeker.met.partner) return false;
     const Vec dx = batch_.placeAt(i, now_) - seeker.x;
-    const Real reach = batch_.radius[i] + seeker.radius;
-    return dot(dx, dx) < reach * reach * Real(1 + 1e-6);
+    return dot(dx, seeker.met.normal) > Real(0.9) * (batch_.radius[i] + seeker.radius);
   }
 
   void takeEarliest(const Seeker& seeker, Found& found) {
@@ -865,7 +878,7 @@ class EventDriven final : public Method {
     log_->add(collision);
   }
 
-  static constexpr Real kEventsPerBucket = 4;
+  static constexpr Real kEventsPerBucket = 1;
   static constexpr std::uint64_t kImpactsPerLayout = 8;  // ball-ball impacts per ball
   static constexpr std::int32_t kFarthestCell = 1 << 30;
 

@@ -29,6 +29,11 @@ constexpr Slot kNoSlot = ~Slot{0};
 template <class Real>
 class EventQueue {
  public:
+  /// How many buckets ahead a ball is announced, each time for the next step of the fetching.
+  static constexpr std::uint32_t kSoon = 8;
+  static constexpr std::uint32_t kSooner = 5;
+  static constexpr std::uint32_t kNext = 2;
+
   /// Forgets all entries and sets the calendar.
   /// @param bucket_width  s, a power of two
   /// @param buckets       a power of two
@@ -36,7 +41,8 @@ class EventQueue {
   void reset(Real bucket_width, std::uint32_t buckets, std::size_t slots) {
     width_ = bucket_width;
     per_width_ = 1 / bucket_width;
-    heads_.assign(buckets, kNoSlot);
+    buckets_ = buckets;
+    heads_.assign(buckets + kFarAhead, kNoSlot);  // one can look ahead without asking
     entries_.assign(slots, Entry{});
     beyond_ = kNoSlot;
     current_ = 0;
@@ -48,7 +54,7 @@ class EventQueue {
   /// Makes room for slots up to `slots`.
   void resize(std::size_t slots) { entries_.resize(slots); }
 
-  Real yearLength() const { return width_ * Real(heads_.size()); }
+  Real yearLength() const { return width_ * Real(buckets_); }
   Real bucketWidth() const { return width_; }
   std::size_t bytes() const {
     return heads_.capacity() * sizeof(Slot) + entries_.capacity() * sizeof(Entry) +
@@ -62,7 +68,7 @@ class EventQueue {
   void insert(Slot slot, Real due, Before before) {
     entries_[slot].due = due;
     const Real position = due * per_width_;
-    if (!(position < Real(heads_.size()))) {
+    if (!(position < Real(buckets_))) {
       link(slot, beyond_, kBeyondYear);
       return;
     }
@@ -88,7 +94,7 @@ class EventQueue {
 
   /// The ball whose event is next, if that is due by `limit`; kNoSlot if not, or if the year is
   /// over. The ball stays queued.
-  /// @param expect  expect(slot, buckets ahead): a ball comes up in a bucket or two
+  /// @param expect  expect(slot, buckets ahead): a ball comes up kSoon, kSooner, kNext
   template <class Before, class Expect>
   Slot peek(Real limit, Before before, Expect expect) {
     while (true) {
@@ -97,7 +103,7 @@ class EventQueue {
         if (isLive(top)) return top.due <= limit ? top.slot : kNoSlot;
         popHeap(before);
       }
-      if (in_year_ == 0 || current_ + 1 == heads_.size()) return kNoSlot;
+      if (in_year_ == 0 || current_ + 1 == buckets_) return kNoSlot;
       if (Real(current_ + 1) * width_ > limit) return kNoSlot;
       ++current_;
       openBucket(before, expect);
@@ -146,6 +152,10 @@ class EventQueue {
   static constexpr std::int32_t kInHeap = -2;
   static constexpr std::int32_t kBeyondYear = -3;
 
+  static constexpr std::uint32_t kFarAhead = 12;
+  // Up to so many balls all is in the cache anyway, and to fetch ahead would only cost.
+  static constexpr std::size_t kCachedEntries = 20000;
+
   struct Entry {
     Real due = 0;  // s, in this year
     Slot next = kNoSlot;
@@ -179,16 +189,22 @@ class EventQueue {
 
   template <class Before, class Expect>
   void openBucket(Before before, Expect expect) {
-    for (std::uint32_t ahead = 1; ahead <= 2; ++ahead) {
-      if (current_ + ahead >= heads_.size()) break;
-      for (Slot s = heads_[current_ + ahead]; s != kNoSlot; s = entries_[s].next) expect(s, ahead);
-    }
+    if (entries_.size() > kCachedEntries) announce(expect);
     for (Slot slot = heads_[current_]; slot != kNoSlot; slot = entries_[slot].next) {
       entries_[slot].bucket = kInHeap;
       heap_.push_back({entries_[slot].due, slot});
     }
     heads_[current_] = kNoSlot;
     std::make_heap(heap_.begin(), heap_.end(), later(before));
+  }
+
+  template <class Expect>
+  void announce(Expect expect) {
+    const Slot far = heads_[current_ + kFarAhead];
+    if (far != kNoSlot) __builtin_prefetch(&entries_[far]);
+    for (const std::uint32_t ahead : {kSoon, kSooner, kNext}) {
+      for (Slot s = heads_[current_ + ahead]; s != kNoSlot; s = entries_[s].next) expect(s, ahead);
+    }
   }
 
   void link(Slot slot, Slot& head, std::int32_t bucket) {
@@ -216,6 +232,7 @@ class EventQueue {
   HugePageVector<Slot> heads_;     // of the buckets' lists
   HugePageVector<Entry> entries_;  // by slot
   Slot beyond_ = kNoSlot;          // head of the list of events beyond the year
+  std::uint32_t buckets_ = 0;
   std::uint32_t current_ = 0;
   std::vector<HeapEntry> heap_;  // events of the current bucket and those that came late into it
   std::size_t in_year_ = 0;      // events in buckets and heap
