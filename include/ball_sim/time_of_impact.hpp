@@ -131,7 +131,8 @@ Real timeOfImpactAccelerated(const VectorOf<Real>& dx, const VectorOf<Real>& dv,
   ends[count++] = last;
 
   // Walk the stretches; `fall` is where the present fall of the distance began.
-  bool falling = slope(0) < 0;
+  // At relative rest what comes next decides: it is where the quartic leaves its turning point.
+  bool falling = g0 < 0 || (g0 == 0 && (g1 < 0 || (g1 == 0 && g2 < 0)));
   Real fall = 0;
   for (int i = 0; i + 1 < count; ++i) {
     const bool falls_at_end = slope(ends[i + 1]) < 0;
