@@ -59,6 +59,7 @@ class EventDriven final : public Method {
     for (int axis = 0; axis < 3; ++axis) {
       if (!surroundings.periodic || (axis == 2 && surroundings.planar())) continue;
       period_[axis] = Real(surroundings.box.max[axis]) - Real(surroundings.box.min[axis]);
+      smallest_period_ = std::min(smallest_period_, period_[axis]);
     }
     for (int image = 0; image < 27; ++image) {
       image_shift_[static_cast<std::size_t>(image)] = {Real(image % 3 - 1) * period_[0],
@@ -147,7 +148,7 @@ class EventDriven final : public Method {
         return false;
       }
       --max_events;
-      now_ = std::max(now_, queue_.pop(tieOrder()));
+      now_ = std::max(now_, queue_.pop());
       ++statistics_.events;
       handle(slot);
     }
@@ -215,7 +216,8 @@ class EventDriven final : public Method {
     Real crossing_time = kNever<Real>;  // s, in this year
     std::uint32_t partner = 0;          // slot, or kWall + index into walls_
     std::uint32_t partner_version = 0;  // the partner's version when the impact was found
-    std::uint32_t version = 0;          // counts the changes of this ball's trajectory
+    BallId partner_id = 0;
+    std::uint32_t version = 0;  // counts the changes of this ball's trajectory
     BallId id = 0;
     double mass = 0;  // kg
     CellCoordinates cell = {0, 0, 0};
@@ -275,17 +277,15 @@ class EventDriven final : public Method {
   Real inverseMass(Slot slot) const { return 1 / Real(agendas_[slot].mass); }  // 1/kg; 0: fixed
 
   // Order of events at one instant: smaller id, then larger id; a crossing has no second partner.
-  std::pair<Partner, Partner> partners(Slot slot) const {
-    const Agenda& agenda = agendas_[slot];
-    const Partner self = agenda.id;
-    if (agenda.crossing_time < agenda.impact_time) return {self, self};
-    const Partner other = agenda.partner >= kWall ? walls_[agenda.partner - kWall].partner
-                                                  : Partner{agendas_[agenda.partner].id};
-    return {std::min(self, other), std::max(self, other)};
-  }
-
   auto tieOrder() const {
-    return [this](Slot a, Slot b) { return partners(a) < partners(b); };
+    return [this](Slot slot) {
+      const Agenda& agenda = agendas_[slot];
+      const Partner self = agenda.id;
+      if (agenda.crossing_time < agenda.impact_time) return TieOrder(self, self);
+      const Partner other = agenda.partner >= kWall ? walls_[agenda.partner - kWall].partner
+                                                    : Partner{agenda.partner_id};
+      return TieOrder(std::min(self, other), std::max(self, other));
+    };
   }
 
   // Fetches from memory what balls that come up soon will need: each step needs what the one
@@ -352,6 +352,24 @@ class EventDriven final : public Method {
         dx[axis] -= floor(dx[axis] / period_[axis] + Real(0.5)) * period_[axis];
     }
     return dx;
+  }
+
+  // From a to the image of b that it meets: the nearest, but where the box is so small that several
+  // are in reach, the one it approaches fastest.
+  Vec contactVector(const Body& a, const Body& b, Real reach) const {
+    const Vec nearest = nearestImage(b.x - a.x);
+    if (smallest_period_ > Real(2.1) * reach) return nearest;
+    Vec best = nearest;
+    Real fastest = -kNever<Real>;
+    for (const Vec& shift : image_shift_) {
+      const Vec dx = nearest + shift;
+      const Real approach = -dot(dx, Vec(b.v - a.v));
+      if (dot(dx, dx) < reach * reach * Real(1 + 1e-9) && approach > fastest) {
+        fastest = approach;
+        best = dx;
+      }
+    }
+    return best;
   }
 
   // A crossing puts a ball back into the periodic box a rounding error early or late.
@@ -584,9 +602,9 @@ class EventDriven final : public Method {
     settle(second);
     Body& a = bodies_[first];
     Body& b = bodies_[second];
-    const Vec dx = nearestImage(b.x - a.x);
-    const Vec n = contactNormal<Real>(dx);
     const Real reach = a.radius + b.radius;
+    const Vec dx = contactVector(a, b, reach);
+    const Vec n = contactNormal<Real>(dx);
     Real e = restitution_;
     Real least = 0;
     if constexpr (kGravity) {
@@ -686,8 +704,10 @@ class EventDriven final : public Method {
     Agenda& agenda = agendas_[slot];
     agenda.impact_time = found.time;
     agenda.partner = found.partner;
-    agenda.partner_version =
-        found.partner < kWall && found.time < kNever<Real> ? agendas_[found.partner].version : 0;
+    if (found.partner < kWall && found.time < kNever<Real>) {
+      agenda.partner_version = agendas_[found.partner].version;
+      agenda.partner_id = agendas_[found.partner].id;
+    }
   }
 
   // One ball, as it is now, in search of its next impact.
@@ -889,6 +909,7 @@ class EventDriven final : public Method {
   std::array<std::int32_t, 6> face_walls_{};  // indices into walls_, by face
   std::vector<std::uint32_t> planes_;         // indices into walls_
   Vec period_ = Vec::Zero();                  // m; 0: that axis does not wrap
+  Real smallest_period_ = kNever<Real>;       // m
   std::array<Vec, 27> image_shift_;           // m
 
   // One entry a slot; a slot is reused when its ball is removed.

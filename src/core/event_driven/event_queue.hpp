@@ -15,6 +15,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "event_driven/huge_page_vector.hpp"
@@ -24,6 +25,9 @@ namespace ball_sim {
 /// Index of a ball in a method's arrays.
 using Slot = std::uint32_t;
 constexpr Slot kNoSlot = ~Slot{0};
+
+/// Decides between events at one instant; the smaller goes first.
+using TieOrder = std::pair<std::int64_t, std::int64_t>;
 
 /// @tparam Real  double or long double
 template <class Real>
@@ -62,10 +66,10 @@ class EventQueue {
   }
 
   /// Adds a ball that is not queued.
-  /// @param due     s in this year, not before the last event taken out
-  /// @param before  order of the balls' events at one instant, before(slot, slot)
-  template <class Before>
-  void insert(Slot slot, Real due, Before before) {
+  /// @param due    s in this year, not before the last event taken out
+  /// @param order  order(slot) gives the TieOrder of a ball's event
+  template <class Order>
+  void insert(Slot slot, Real due, Order order) {
     entries_[slot].due = due;
     const Real position = due * per_width_;
     if (!(position < Real(buckets_))) {
@@ -75,9 +79,8 @@ class EventQueue {
     ++in_year_;
     const auto bucket = static_cast<std::uint32_t>(position);
     if (bucket <= current_) {
-      entries_[slot].bucket = kInHeap;
-      heap_.push_back({due, slot});
-      std::push_heap(heap_.begin(), heap_.end(), later(before));
+      addToHeap(slot, order);
+      std::push_heap(heap_.begin(), heap_.end());
     } else {
       link(slot, heads_[bucket], static_cast<std::int32_t>(bucket));
     }
@@ -95,35 +98,34 @@ class EventQueue {
   /// The ball whose event is next, if that is due by `limit`; kNoSlot if not, or if the year is
   /// over. The ball stays queued.
   /// @param expect  expect(slot, buckets ahead): a ball comes up kSoon, kSooner, kNext
-  template <class Before, class Expect>
-  Slot peek(Real limit, Before before, Expect expect) {
+  template <class Order, class Expect>
+  Slot peek(Real limit, Order order, Expect expect) {
     while (true) {
       while (!heap_.empty()) {
         const HeapEntry& top = heap_.front();
         if (isLive(top)) return top.due <= limit ? top.slot : kNoSlot;
-        popHeap(before);
+        popHeap();
       }
       if (in_year_ == 0 || current_ + 1 == buckets_) return kNoSlot;
       if (Real(current_ + 1) * width_ > limit) return kNoSlot;
       ++current_;
-      openBucket(before, expect);
+      openBucket(order, expect);
     }
   }
 
   /// Takes out the ball that peek() just named, and tells when it was due.
-  template <class Before>
-  Real pop(Before before) {
+  Real pop() {
     const HeapEntry top = heap_.front();
     entries_[top.slot].bucket = kNotQueued;
     --in_year_;
-    popHeap(before);
+    popHeap();
     return top.due;
   }
 
   /// Begins a new year `by` seconds later; this one must be empty.
   /// @param by  whole years
-  template <class Before>
-  void turnYear(Real by, Before before) {
+  template <class Order>
+  void turnYear(Real by, Order order) {
     assert(in_year_ == 0);
     current_ = 0;
     heap_.clear();
@@ -133,7 +135,7 @@ class EventQueue {
       Entry& entry = entries_[slot];
       const Slot next = entry.next;
       entry.bucket = kNotQueued;
-      insert(slot, entry.due - by, before);
+      insert(slot, entry.due - by, order);
       slot = next;
     }
   }
@@ -161,41 +163,46 @@ class EventQueue {
     Slot next = kNoSlot;
     Slot previous = kNoSlot;
     std::int32_t bucket = kNotQueued;  // or one of the marks above
+    std::uint32_t stamp = 0;           // tells the heap's entry from those left behind
   };
 
   struct HeapEntry {
     Real due;
+    TieOrder order;
     Slot slot;
-  };
+    std::uint32_t stamp;
 
-  // The heap's top is the earliest.
-  template <class Before>
-  static auto later(Before before) {
-    return [before](const HeapEntry& a, const HeapEntry& b) {
-      return a.due != b.due ? a.due > b.due : before(b.slot, a.slot);
-    };
-  }
+    // The standard heap has the largest on top: the earliest is the largest.
+    bool operator<(const HeapEntry& other) const {
+      return due != other.due ? due > other.due : order > other.order;
+    }
+  };
 
   bool isLive(const HeapEntry& top) const {
     const Entry& entry = entries_[top.slot];
-    return entry.bucket == kInHeap && entry.due == top.due;
+    return entry.bucket == kInHeap && entry.stamp == top.stamp;
   }
 
-  template <class Before>
-  void popHeap(Before before) {
-    std::pop_heap(heap_.begin(), heap_.end(), later(before));
+  template <class Order>
+  void addToHeap(Slot slot, Order order) {
+    Entry& entry = entries_[slot];
+    entry.bucket = kInHeap;
+    heap_.push_back({entry.due, order(slot), slot, ++entry.stamp});
+  }
+
+  void popHeap() {
+    std::pop_heap(heap_.begin(), heap_.end());
     heap_.pop_back();
   }
 
-  template <class Before, class Expect>
-  void openBucket(Before before, Expect expect) {
+  template <class Order, class Expect>
+  void openBucket(Order order, Expect expect) {
     if (entries_.size() > kCachedEntries) announce(expect);
     for (Slot slot = heads_[current_]; slot != kNoSlot; slot = entries_[slot].next) {
-      entries_[slot].bucket = kInHeap;
-      heap_.push_back({entries_[slot].due, slot});
+      addToHeap(slot, order);
     }
     heads_[current_] = kNoSlot;
-    std::make_heap(heap_.begin(), heap_.end(), later(before));
+    std::make_heap(heap_.begin(), heap_.end());
   }
 
   template <class Expect>
