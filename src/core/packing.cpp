@@ -37,6 +37,10 @@ constexpr std::size_t kTriesForOne = 20000;
 constexpr double kJammedInSpace = 0.63;
 constexpr double kJammedInPlane = 0.83;
 
+// Small balls fit between large ones, but beyond this a try would only cost time.
+constexpr double kUnequalJammedInSpace = 0.74;
+constexpr double kUnequalJammedInPlane = 0.90;
+
 // Pushing apart moves all balls many times: with more of them than this, a lattice is quicker.
 constexpr std::size_t kManyBalls = 20000;
 
@@ -107,6 +111,11 @@ double quickFraction(bool planar, bool lattice_is_quicker) {
   return planar ? kQuickInPlane : kQuickInSpace;
 }
 
+double jammedFraction(bool planar, bool equal) {
+  if (equal) return planar ? kJammedInPlane : kJammedInSpace;
+  return planar ? kUnequalJammedInPlane : kUnequalJammedInSpace;
+}
+
 bool equalRadii(const std::vector<Ball>& balls) {
   return std::all_of(balls.begin(), balls.end(),
                      [&balls](const Ball& ball) { return ball.radius == balls.front().radius; });
@@ -126,10 +135,10 @@ void placeBalls(std::vector<Ball>& balls, const Surroundings& surroundings,
     placed = addSequentially(balls, surroundings, present, random);
     if (placed == balls.size()) return;
   }
-  const double jammed = surroundings.planar() ? kJammedInPlane : kJammedInSpace;
+  const double jammed = jammedFraction(surroundings.planar(), equal);
   const bool lattice_first = many || fraction > jammed;
   if (equal && lattice_first && placeOnLattice(balls, surroundings, present, random)) return;
-  if (fraction < (equal ? jammed : 1)) {
+  if (fraction < jammed) {
     placed = std::max(placed, relax(balls, surroundings, present, random));
     if (placed == balls.size()) return;
   }

@@ -18,6 +18,9 @@ constexpr double kMargin = 1e-3;
 constexpr double kMostMoves = 4e6;
 constexpr std::size_t kMostSweeps = 5000;
 
+// Sweeps without any fewer overlaps after which nothing is to be hoped for.
+constexpr std::size_t kPatience = 500;
+
 // Where balls push each other from all sides, full steps overshoot.
 constexpr double kStep = 0.6;
 
@@ -122,11 +125,15 @@ std::size_t relax(std::vector<Ball>& balls, const Surroundings& surroundings,
   relaxation.scatter(random);
   const auto count = static_cast<double>(balls.size());
   const auto sweeps = std::min(kMostSweeps, static_cast<std::size_t>(1 + kMostMoves / count));
-  std::size_t overlapping_balls = balls.size();
-  for (std::size_t sweep = 0; sweep < sweeps && overlapping_balls > 0; ++sweep) {
-    overlapping_balls = relaxation.sweep();
+  std::size_t fewest = balls.size();
+  std::size_t patience = kPatience;
+  for (std::size_t sweep = 0; sweep < sweeps && fewest > 0 && patience > 0; ++sweep, --patience) {
+    const std::size_t overlapping_balls = relaxation.sweep();
+    if (overlapping_balls >= fewest) continue;
+    fewest = overlapping_balls;
+    patience = kPatience;
   }
-  return balls.size() - overlapping_balls;
+  return balls.size() - fewest;
 }
 
 }  // namespace ball_sim

@@ -15,7 +15,7 @@ namespace ball_sim {
 /// Gets to about 0.58 for equal balls in space and 0.78 for discs, a little further for mixed
 /// sizes. The work is bounded: above 10^5 balls, dense fills of unequal balls do not come to an
 /// end.
-/// @return how many balls overlap nothing in the end; all of them: `balls` are placed
+/// @return how many balls overlap nothing at best; all of them: `balls` are placed
 std::size_t relax(std::vector<Ball>& balls, const Surroundings& surroundings,
                   const std::vector<Ball>& present, RandomSource& random);
 
