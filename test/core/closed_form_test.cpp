@@ -134,6 +134,28 @@ TEST_P(ClosedForm, twoImagesHitFromBothSides) {
   }
 }
 
+// A small ball falls between a fixed ball and its image and touches both at once.
+TEST_P(ClosedForm, twoImagesAreHitAtOnce) {
+  TestScene scene;
+  scene.surroundings.periodic = true;
+  scene.surroundings.box.min = Vector3(-0.75, -2, -2);
+  scene.surroundings.box.max = Vector3(0.75, 2, 2);
+  scene.balls = {{Vector3::Zero(), Vector3::Zero(), 0.7, kFixed},
+                 {Vector3(-0.75, 1.5, 0), Vector3(0, -1, 0), 0.55, 1}};
+  Trial run(GetParam(), scene);
+  // Centres 1 m below: contact with both at y = sqrt(1.25^2 - 0.75^2) = 1, normals (+-3, 4)/5.
+  run.advanceTo(0.6, 100);
+  ASSERT_EQ(run.collisions().size(), 2u);
+  for (const Collision& collision : run.collisions()) {
+    EXPECT_NEAR(collision.time.seconds(), 0.5, 1e-14);
+    EXPECT_NEAR(collision.normal.y(), 0.8, 1e-14);
+  }
+  EXPECT_NEAR(run.collisions()[0].normal.x(), -run.collisions()[1].normal.x(), 1e-14);
+  // Off the first with (+-24, 7)/25; off the second at 24/25 * 3/5 - 7/25 * 4/5 = 44/125 m/s.
+  EXPECT_NEAR(run.collisions()[1].approach_speed, 44.0 / 125, 1e-14);
+  EXPECT_NEAR(run.velocity(1).norm(), 1, 1e-14);
+}
+
 INSTANTIATE_TEST_SUITE_P(ExactMethods, ClosedForm, testing::ValuesIn(exactMethods()), methodOf);
 
 }  // namespace
