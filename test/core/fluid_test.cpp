@@ -57,6 +57,8 @@ TestScene discs(int rows, double eta, std::uint64_t seed) {
   return scene;
 }
 
+constexpr double kMeasuring = 3200;  // collisions a ball
+
 struct Measured {
   double by_virial = 0;  // Z
   double by_rate = 0;    // Z
@@ -113,6 +115,7 @@ double tolerance(const Measured& measured, std::size_t balls) {
 void expectFluid(const Measured& measured, double z, double theory, std::size_t balls,
                  int dimension) {
   EXPECT_NEAR((measured.by_virial - 1) / (z - 1), 1, tolerance(measured, balls) + theory);
+  // Over kMeasuring the two scatter by 0.07 % (seen over 8 seeds).
   EXPECT_NEAR((measured.by_rate - 1) / (measured.by_virial - 1), 1, 0.003);
   const double n = dimension * (double(balls) - 1);
   // Fourth moments of some 10^4 independent components scatter by about sqrt(96 / 10^4).
@@ -125,7 +128,7 @@ TEST_P(Fluid, spheresFollowCarnahanStarling) {
   for (const double rho : {0.2, 0.5, 0.9}) {
     SCOPED_TRACE("rho " + std::to_string(rho));
     const TestScene scene = spheres(5, rho, 1);  // 500 balls
-    const Measured measured = measure(GetParam(), scene, 100, 800);
+    const Measured measured = measure(GetParam(), scene, 100, kMeasuring);
     const double z = compressibilityOfSpheres(std::acos(-1.0) / 6 * rho);
     expectFluid(measured, z, 0.003, scene.balls.size(), 3);  // 0.3 %: the formula itself
   }
@@ -135,7 +138,7 @@ TEST_P(Fluid, discsFollowHenderson) {
   for (const double eta : {0.2, 0.45}) {
     SCOPED_TRACE("eta " + std::to_string(eta));
     const TestScene scene = discs(24, eta, 2);  // 576 balls
-    const Measured measured = measure(GetParam(), scene, 100, 600);
+    const Measured measured = measure(GetParam(), scene, 100, kMeasuring);
     expectFluid(measured, compressibilityOfDiscs(eta), 0.01, scene.balls.size(), 2);
   }
 }
