@@ -56,6 +56,7 @@ struct AxisNeighbours {
   std::uint8_t begin = 1;                                     ///< first that is not kNone
   std::uint8_t end = 2;                                       ///< behind the last
   bool wraps = false;                                         ///< some image is not at home
+  bool inside = false;  ///< the neighbours lie where they lie for most cells: no edge is near
 };
 
 /// The balls found near a ball, with the image each was found in.
@@ -68,6 +69,12 @@ struct Candidates {
   void clear() {
     count = 0;
     wraps = false;
+  }
+
+  /// From here on images differ; those found so far are at home.
+  void wrap() {
+    if (!wraps) std::fill_n(images.begin(), count, kHomeImage);
+    wraps = true;
   }
 
   /// Makes room for `more` beyond `count`.
@@ -94,14 +101,16 @@ struct alignas(16) Cell {
   std::uint32_t count = 0;
 };
 
-/// A block of cells: each row's offset plus each column's is a cell.
-struct CellBlock {
-  std::array<std::uint32_t, 9> row;  ///< along y and z
-  std::array<Image, 9> row_image;
-  std::array<std::uint32_t, 3> column;  ///< along x
-  std::array<Image, 3> column_image;
-  std::size_t rows = 0;
-  std::size_t columns = 0;
+/// Some cells around a cell, as indices or as offsets to an index, and the images they stand for.
+struct CellList {
+  std::array<std::uint32_t, 27> cell{};
+  std::array<Image, 27> image{};
+  std::size_t count = 0;
+
+  void add(std::uint32_t c, Image i) {
+    cell[count] = c;
+    image[count++] = i;
+  }
 };
 
 /// One level of cells, and who is in them.
@@ -121,6 +130,7 @@ class CellLevel {
       digit *= 3;
     }
     cells_.resize(stride);
+    listOffsets(counts, periodic);
   }
 
   int depth() const { return depth_; }
@@ -197,27 +207,39 @@ class CellLevel {
     }
   }
 
-  /// Adds the members of the cells at rows[..] + columns[..]; the compiler unrolls the 27 of a full
-  /// neighbourhood.
-  template <bool kWraps>
-  void gather(const CellBlock& block, Candidates& candidates) const {
+  /// Adds the members of the 27 cells around `c`, or of the layer of them at `direction` (0 lower,
+  /// 2 upper) of `axis`; and the guests there if `with_guests`.
+  void gather(const CellCoordinates& c, std::size_t axis, std::size_t direction, bool with_guests,
+              Candidates& candidates) const {
+    const AxisNeighbours& x = neighbours(0, c[0]);
+    const AxisNeighbours& y = neighbours(1, c[1]);
+    const AxisNeighbours& z = neighbours(2, c[2]);
     candidates.reserve(27 * 4);
-    if (block.rows == 9 && block.columns == 3) {
-      gatherRows<kWraps>(block, 9, 3, candidates);
-    } else {
-      gatherRows<kWraps>(block, block.rows, block.columns, candidates);
+    const bool around = axis == kAllAround;
+    if (x.inside && y.inside && z.inside) {
+      const std::uint32_t middle = x.cell[1] + y.cell[1] + z.cell[1];
+      const CellList& offsets = around ? around_ : layers_[2 * axis + direction / 2];
+      if (candidates.wraps) {
+        gatherCells<true>(middle, offsets, offsets.count, candidates);
+      } else if (offsets.count == 27) {  // the usual case, unrolled
+        gatherCells<false>(middle, offsets, 27, candidates);
+      } else {
+        gatherCells<false>(middle, offsets, offsets.count, candidates);
+      }
+      if (with_guests) gatherGuests(middle, offsets, candidates);
+      return;
     }
+    const CellList list = listAtEdge({&x, &y, &z}, axis, direction);
+    if (x.wraps || y.wraps || z.wraps) candidates.wrap();
+    if (candidates.wraps) {
+      gatherCells<true>(0, list, list.count, candidates);
+    } else {
+      gatherCells<false>(0, list, list.count, candidates);
+    }
+    if (with_guests) gatherGuests(0, list, candidates);
   }
 
-  void gatherGuests(const CellBlock& block, Candidates& candidates) const {
-    for (std::size_t r = 0; r < block.rows; ++r) {
-      for (std::size_t c = 0; c < block.columns; ++c) {
-        const Image image = block.row_image[r] + block.column_image[c];
-        Slot s = guests_[block.row[r] + block.column[c]];
-        for (; s != kNoSlot; s = next_[s]) candidates.add(s, image);
-      }
-    }
-  }
+  static constexpr std::size_t kAllAround = 3;  // no axis
 
   std::size_t bytes() const {
     std::size_t bytes =
@@ -228,35 +250,88 @@ class CellLevel {
   }
 
  private:
-  template <bool kWraps>
-  inline __attribute__((always_inline)) void gatherRows(const CellBlock& block, std::size_t rows,
-                                                        std::size_t columns,
-                                                        Candidates& candidates) const {
-    Slot* slots = candidates.slots.data();
-    Image* images = candidates.images.data();
-    std::size_t count = candidates.count;
-    for (std::size_t r = 0; r < rows; ++r) {
-      for (std::size_t c = 0; c < columns; ++c) {
-        const Cell& cell = cells_[block.row[r] + block.column[c]];
-        // One copy of the whole cell; what is too much is overwritten by the next.
-        std::memcpy(slots + count, &cell, sizeof(Cell));
-        const Image image = block.row_image[r] + block.column_image[c];
-        if constexpr (kWraps) {
-          const std::array<Image, 4> same = {image, image, image, image};
-          std::memcpy(images + count, &same, sizeof(same));
-        }
-        if (__builtin_expect(cell.count <= Cell::kInPlace, 1)) {
-          count += cell.count;
-        } else {
-          candidates.count = count + Cell::kInPlace;
-          gatherChain(cell, image, candidates);
-          slots = candidates.slots.data();
-          images = candidates.images.data();
-          count = candidates.count;
+  // Where the neighbours of a cell lie that no edge is near, as offsets.
+  void listOffsets(const std::array<std::uint32_t, 3>& counts,
+                   const std::array<bool, 3>& periodic) {
+    const auto steps = [&](std::size_t axis) {
+      return counts[axis] == 1 && !periodic[axis] ? std::vector<int>{0}
+                                                  : std::vector<int>{-1, 0, 1};
+    };
+    const auto width = static_cast<std::int64_t>(counts[0]);
+    const auto area = width * static_cast<std::int64_t>(counts[1]);
+    for (const int z : steps(2)) {
+      for (const int y : steps(1)) {
+        for (const int x : steps(0)) {
+          const auto offset = static_cast<std::uint32_t>(x + width * y + area * z);
+          around_.add(offset, kHomeImage);
+          const std::array<int, 3> step = {x, y, z};
+          for (std::size_t axis = 0; axis < 3; ++axis) {
+            if (step[axis] < 0) layers_[2 * axis].add(offset, kHomeImage);
+            if (step[axis] > 0) layers_[2 * axis + 1].add(offset, kHomeImage);
+          }
         }
       }
     }
+  }
+
+  static CellList listAtEdge(const std::array<const AxisNeighbours*, 3>& near, std::size_t axis,
+                             std::size_t direction) {
+    std::array<std::size_t, 3> from{};
+    std::array<std::size_t, 3> to{};
+    CellList list;
+    for (std::size_t k = 0; k < 3; ++k) {
+      from[k] = k == axis ? direction : near[k]->begin;
+      to[k] = k == axis ? direction + 1 : near[k]->end;
+      if (k == axis && near[k]->cell[direction] == AxisNeighbours::kNone) return list;
+    }
+    for (std::size_t k = from[2]; k < to[2]; ++k) {
+      for (std::size_t j = from[1]; j < to[1]; ++j) {
+        const std::uint32_t row = near[2]->cell[k] + near[1]->cell[j];
+        const Image row_image = near[2]->image[k] + near[1]->image[j];
+        for (std::size_t i = from[0]; i < to[0]; ++i) {
+          list.add(row + near[0]->cell[i], row_image + near[0]->image[i]);
+        }
+      }
+    }
+    return list;
+  }
+
+  template <bool kWraps>
+  inline __attribute__((always_inline)) void gatherCells(std::uint32_t middle, const CellList& list,
+                                                         std::size_t number,
+                                                         Candidates& candidates) const {
+    Slot* slots = candidates.slots.data();
+    Image* images = candidates.images.data();
+    const Cell* cells = cells_.data();
+    std::size_t count = candidates.count;
+    for (std::size_t i = 0; i < number; ++i) {
+      // Offsets may be negative: the sum is meant modulo 2^32.
+      const Cell& cell = cells[static_cast<std::uint32_t>(middle + list.cell[i])];
+      // One copy of the whole cell; what is too much is overwritten by the next.
+      std::memcpy(slots + count, &cell, sizeof(Cell));
+      if constexpr (kWraps) {
+        const Image image = list.image[i];
+        const std::array<Image, 4> same = {image, image, image, image};
+        std::memcpy(images + count, &same, sizeof(same));
+      }
+      if (__builtin_expect(cell.count <= Cell::kInPlace, 1)) {
+        count += cell.count;
+      } else {
+        candidates.count = count + Cell::kInPlace;
+        gatherChain(cell, list.image[i], candidates);
+        slots = candidates.slots.data();
+        images = candidates.images.data();
+        count = candidates.count;
+      }
+    }
     candidates.count = count;
+  }
+
+  void gatherGuests(std::uint32_t middle, const CellList& list, Candidates& candidates) const {
+    for (std::size_t i = 0; i < list.count; ++i) {
+      Slot s = guests_[static_cast<std::uint32_t>(middle + list.cell[i])];
+      for (; s != kNoSlot; s = next_[s]) candidates.add(s, list.image[i]);
+    }
   }
 
   void gatherChain(const Cell& cell, Image image, Candidates& candidates) const {
@@ -284,6 +359,7 @@ class CellLevel {
       if (periodic && c == 0) near.image[0] = 0;
       if (periodic && c + 1 == count) near.image[2] = 2 * digit;
       near.wraps = periodic && (c == 0 || c + 1 == count);
+      near.inside = (c > 0 && c + 1 < count) || (count == 1 && !periodic);
     }
     return table;
   }
@@ -291,7 +367,9 @@ class CellLevel {
   int depth_;
   std::array<std::int32_t, 3> mask_{};  // of coordinates on open axes; all ones elsewhere
   std::array<std::vector<AxisNeighbours>, 3> neighbours_;
-  HugePageVector<Cell> cells_;  // members
+  HugePageVector<Cell> cells_;      // members
+  CellList around_;                 // offsets of the neighbours of a cell inside
+  std::array<CellList, 6> layers_;  // and of those on each side: lower x, upper x, lower y, ...
   std::vector<Slot> guests_;    // heads of the lists of balls of finer levels; empty without any
   std::vector<Slot> next_;      // in a cell's chain, or a list of guests
   std::vector<Slot> previous_;  // in a list of guests
@@ -411,8 +489,7 @@ class CellGrid {
                   Candidates& candidates) const {
     candidates.clear();
     for (std::size_t m = 0; m <= level; ++m) {
-      gatherCells(levels_[m], coarser(coordinates, level, m), kAllAround, 0, m == level,
-                  candidates);
+      gatherAt(m, coarser(coordinates, level, m), CellLevel::kAllAround, 0, m == level, candidates);
     }
   }
 
@@ -426,7 +503,7 @@ class CellGrid {
     candidates.clear();
     for (std::size_t m = 0; m <= level; ++m) {
       if (coarser(unwrapped, level, m)[axis] == coarser(before, level, m)[axis]) continue;
-      gatherCells(levels_[m], coarser(after, level, m), axis, direction, m == level, candidates);
+      gatherAt(m, coarser(after, level, m), axis, direction, m == level, candidates);
     }
   }
 
@@ -442,38 +519,9 @@ class CellGrid {
   }
 
  private:
-  static constexpr std::size_t kAllAround = 3;  // no axis
-
-  // The 27 cells around `c`, or of them only the layer at `direction` of `axis`.
-  static void gatherCells(const CellLevel& level, const CellCoordinates& c, std::size_t axis,
-                          std::size_t direction, bool own, Candidates& candidates) {
-    std::array<const AxisNeighbours*, 3> near{};
-    std::array<std::size_t, 3> from{};
-    std::array<std::size_t, 3> to{};
-    for (std::size_t k = 0; k < 3; ++k) {
-      near[k] = &level.neighbours(k, c[k]);
-      from[k] = k == axis ? direction : near[k]->begin;
-      to[k] = k == axis ? direction + 1 : near[k]->end;
-      if (k == axis && near[k]->cell[direction] == AxisNeighbours::kNone) return;
-      candidates.wraps = candidates.wraps || near[k]->wraps;
-    }
-    CellBlock block;
-    for (std::size_t k = from[2]; k < to[2]; ++k) {
-      for (std::size_t j = from[1]; j < to[1]; ++j) {
-        block.row[block.rows] = near[2]->cell[k] + near[1]->cell[j];
-        block.row_image[block.rows++] = near[2]->image[k] + near[1]->image[j];
-      }
-    }
-    for (std::size_t i = from[0]; i < to[0]; ++i) {
-      block.column[block.columns] = near[0]->cell[i];
-      block.column_image[block.columns++] = near[0]->image[i];
-    }
-    if (candidates.wraps) {
-      level.gather<true>(block, candidates);
-    } else {
-      level.gather<false>(block, candidates);
-    }
-    if (own && level.hasGuests()) level.gatherGuests(block, candidates);
+  void gatherAt(std::size_t level, const CellCoordinates& c, std::size_t axis,
+                std::size_t direction, bool own, Candidates& candidates) const {
+    levels_[level].gather(c, axis, direction, own && levels_[level].hasGuests(), candidates);
   }
 
   std::array<GridAxis<Real>, 3> axes_;
