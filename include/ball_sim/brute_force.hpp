@@ -291,14 +291,11 @@ class BruteForce final : public Method {
     const Real reach = a.radius + b.radius;
     const Real speed = dot(a.v, n) - dot(b.v, n);
     Real e = Real(surroundings_.restitution);
-    Real least = leastRebound<Real>(dot(Vec(a.a - b.a), n), reach);
+    const Real least = leastRebound<Real>(dot(Vec(a.a - b.a), n), reach);
     if (e < 1) {
       const bool a_collapses = a.history.record(elapsed_, speed, reach);
       const bool b_collapses = b.history.record(elapsed_, speed, reach);
-      if (a_collapses || b_collapses) {
-        e = 1;
-        least = std::max(least, collapseRebound<Real>(speedOf(a), speedOf(b)));
-      }
+      if (a_collapses || b_collapses) e = 1;
     }
     const Exchange<Real> passed = collide<Real>(a.v, a.w, b.v, b.w, n, e, least);
     velocityChanged(a);
@@ -318,19 +315,14 @@ class BruteForce final : public Method {
     const Real pull = dot(body.a, wall.normal);
     const Real speed = -dot(body.v, wall.normal);
     Real e = Real(surroundings_.restitution);
-    Real least = 0;
-    if (e < 1 && !(pull < 0) && body.history.record(elapsed_, speed, body.radius)) {
-      e = 1;
-      least = collapseRebound<Real>(speedOf(body), Real(0));
-    }
+    if (e < 1 && !(pull < 0) && body.history.record(elapsed_, speed, body.radius)) e = 1;
     noteOverlap(wall.offset + body.radius - dot(body.x, wall.normal));
-    collideWithWall<Real>(body.v, wall.normal, e, least);
+    collideWithWall<Real>(body.v, wall.normal, e);
     if (comesToRest<Real>(dot(body.v, wall.normal), pull, body.radius)) body.resting.add(index);
     velocityChanged(body);
     if (!(speed > 0)) return;
     ++statistics_.wall_collisions;
-    const Real change = std::max((1 + e) * speed, speed + least);
-    report(body, wall.partner, -wall.normal, change / body.w, speed);
+    report(body, wall.partner, -wall.normal, (1 + e) * speed / body.w, speed);
   }
 
   static Real speedOf(const Body& body) {

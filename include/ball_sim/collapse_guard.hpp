@@ -9,9 +9,8 @@
 // a run of quick impacts is treated so: a cradle or a rack of touching balls, where a few impacts
 // follow at one instant, keeps its restitution.
 //
-// Elastic alone is not enough once the speeds along the normals are down to the rounding of the
-// speeds across them: the last bit then says for ever that the partners approach. In a collapse
-// they part at no less than 1e-12 of their speeds, far above rounding and far below anything seen.
+// Once the speeds along the normals are down to the rounding of the speeds across them, the
+// collision law parts the partners by a few ulps, and that is the end of it.
 //
 // A ball that lies on a fixed or resting ball is the other case: there the floor under the rebound
 // speed keeps it humming within 1e-6 of the sum of radii instead of stopping the clock.
@@ -27,7 +26,6 @@ namespace ball_sim {
 constexpr double kQuickDistance = 1e-6;        ///< of the sum of radii
 constexpr std::uint32_t kLongestCascade = 64;  ///< a longer run of quick impacts is a collapse
 constexpr double kHumHeight = 1e-6;            ///< of the sum of radii
-constexpr double kCollapseRebound = 1e-12;     ///< of the partners' speeds
 
 /// What a ball remembers of its impacts.
 template <class Real>
@@ -46,13 +44,6 @@ struct ImpactHistory {
     return quick == kLongestCascade;
   }
 };
-
-/// Least speed at which partners in a collapse part, m/s.
-/// @param speed1, speed2  of the two, m/s; 0 for a wall
-template <class Real>
-Real collapseRebound(Real speed1, Real speed2) {
-  return Real(kCollapseRebound) * (speed1 + speed2);
-}
 
 /// Least speed at which two balls part that their accelerations press together, m/s.
 /// @param pressing  m/s^2, relative acceleration towards each other; <= 0: none, and the result 0

@@ -95,15 +95,13 @@ Exchange<Real> collide(VectorOf<Real>& v1, Real w1, VectorOf<Real>& v2, Real w2,
 /// The same against a wall at rest: the limit of an infinite second mass.
 /// @param v  velocity, m/s; changed in place
 /// @param inward  unit normal of the wall, towards the ball
-/// @param least_rebound  m/s, >= 0: it leaves at least this fast (see collapse_guard.hpp); 0: none
 /// @return speed of approach, m/s; <= 0: it leaves, and nothing happened but to rounding
 template <class Real>
-Real collideWithWall(VectorOf<Real>& v, const VectorOf<Real>& inward, Real restitution,
-                     Real least_rebound = 0) {
+Real collideWithWall(VectorOf<Real>& v, const VectorOf<Real>& inward, Real restitution) {
   using std::abs;
   const Real approach_speed = -dot(v, inward);
   const Real rounding = roundingAlong(v, inward);
-  if (abs(approach_speed) <= rounding) least_rebound = std::max(least_rebound, rounding);
+  const Real least_rebound = abs(approach_speed) <= rounding ? rounding : Real(0);
   if (!(approach_speed > -least_rebound)) return approach_speed;
   Real change = (1 + restitution) * approach_speed;
   if (change < approach_speed + least_rebound) change = approach_speed + least_rebound;

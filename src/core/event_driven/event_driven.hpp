@@ -615,10 +615,7 @@ class EventDriven final : public Method {
       const Real speed = dot(a.v, n) - dot(b.v, n);
       const bool a_collapses = histories_[first].record(now_, speed, reach);
       const bool b_collapses = histories_[second].record(now_, speed, reach);
-      if (a_collapses || b_collapses) {
-        e = 1;
-        least = std::max(least, collapseRebound<Real>(speedOf(a), speedOf(b)));
-      }
+      if (a_collapses || b_collapses) e = 1;
     }
     const Exchange<Real> passed =
         collide<Real>(a.v, inverseMass(first), b.v, inverseMass(second), n, e, least);
@@ -644,13 +641,9 @@ class EventDriven final : public Method {
     if constexpr (kGravity) pull = dot(accelerations_[slot], wall.normal);
     const Real speed = -dot(body.v, wall.normal);
     Real e = restitution_;
-    Real least = 0;
-    if (e < 1 && !(pull < 0) && histories_[slot].record(now_, speed, body.radius)) {
-      e = 1;
-      least = collapseRebound<Real>(speedOf(body), Real(0));
-    }
+    if (e < 1 && !(pull < 0) && histories_[slot].record(now_, speed, body.radius)) e = 1;
     noteOverlap(wall.offset + body.radius - dot(body.x, wall.normal));
-    collideWithWall<Real>(body.v, wall.normal, e, least);
+    collideWithWall<Real>(body.v, wall.normal, e);
     if constexpr (kGravity) {
       if (comesToRest<Real>(dot(body.v, wall.normal), pull, body.radius)) {
         resting_[slot].add(static_cast<int>(index));
@@ -658,8 +651,7 @@ class EventDriven final : public Method {
     }
     if (speed > 0) {
       ++statistics_.wall_collisions;
-      const Real change = std::max((1 + e) * speed, speed + least);
-      report(slot, wall.partner, -wall.normal, change * Real(agendas_[slot].mass), speed);
+      report(slot, wall.partner, -wall.normal, (1 + e) * speed * Real(agendas_[slot].mass), speed);
     }
     velocityChanged(slot);
     search(slot);
@@ -675,11 +667,6 @@ class EventDriven final : public Method {
       accelerations_[slot] =
           settleContacts<Real>(resting_[slot], body.v, body.radius, gravity_, walls_);
     }
-  }
-
-  static Real speedOf(const Body& body) {
-    using std::sqrt;
-    return sqrt(dot(body.v, body.v));
   }
 
   // --- search for a ball's next event
