@@ -7,7 +7,7 @@
 #include "ball_sim/time.hpp"
 #include "ball_sim/vector.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// Names a ball for the whole run: counted from 0 in the order of arrival, never used twice.
 using BallId = std::uint32_t;
@@ -28,4 +28,4 @@ struct BallStates {
   std::vector<Vector3> velocities;  ///< m/s
 };
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -5,7 +5,7 @@
 #include "ball_sim/refusal.hpp"
 #include "ball_sim/surroundings.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// Checks all that concerns one ball and what stands around it; other balls are not looked at.
 /// Finite and within limits.hpp; mass > 0 or +infinity, and then at rest; inside every closed box
@@ -35,4 +35,4 @@ bool overlapping(const Vector3& between, double reach);
 /// "overlaps <other>: centres 0.05 m apart, radii sum to 0.1 m".
 std::string overlapText(const std::string& other, double distance, double reach);
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -19,7 +19,7 @@
 #include "ball_sim/time_of_impact.hpp"
 #include "ball_sim/walls.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// @tparam Real  any floating-point type with sqrt and conversions to and from double
 template <class Real>
@@ -364,4 +364,4 @@ class BruteForce final : public Method {
   CollisionLog* log_ = nullptr;
 };
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -21,7 +21,7 @@
 #include <cstdint>
 #include <limits>
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 constexpr double kQuickDistance = 1e-6;        ///< of the sum of radii
 constexpr std::uint32_t kLongestCascade = 64;  ///< a longer run of quick impacts is a collapse
@@ -53,4 +53,4 @@ Real leastRebound(Real pressing, Real reach) {
   return pressing > 0 ? sqrt(2 * pressing * (Real(kHumHeight) * reach)) : Real(0);
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

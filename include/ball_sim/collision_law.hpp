@@ -15,7 +15,7 @@
 
 #include "ball_sim/vector.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// Unit vector along `dx`, for any length from the smallest denormal to the largest double.
 /// @param dx  centre of 2 minus centre of 1, m
@@ -109,4 +109,4 @@ Real collideWithWall(VectorOf<Real>& v, const VectorOf<Real>& inward, Real resti
   return approach_speed;
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -7,7 +7,7 @@
 
 #include "ball_sim/scene.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// Balls that could not be placed; what() tells how far it came and what would fit.
 class PackingError : public std::runtime_error {
@@ -38,4 +38,4 @@ std::vector<Ball> populate(Scene& scene);
 std::vector<Ball> fillBox(const Fill& fill, const Surroundings& surroundings,
                           const std::vector<Ball>& present);
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

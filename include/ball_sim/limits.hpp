@@ -4,7 +4,7 @@
 // overflows or vanishes in double precision (1e-308..1e308).
 #pragma once
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 constexpr double kMaxCoordinate = 1e9;    ///< m, magnitude of any coordinate of a place or wall
 constexpr double kMaxSpeed = 1e9;         ///< m/s, magnitude of any component of a velocity
@@ -19,4 +19,4 @@ constexpr double kMaxTime = 1e15;         ///< s, the latest date a run may ask 
 /// another ball) and still be called touching.
 constexpr double kTouchSlack = 1e-12;
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -12,7 +12,7 @@
 #include "ball_sim/ball.hpp"
 #include "ball_sim/surroundings.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// One impact, as it happened.
 struct Collision {
@@ -107,4 +107,4 @@ class Method {
   virtual void setCollisionLog(CollisionLog* log) = 0;
 };
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -8,7 +8,7 @@
 #include "ball_sim/method.hpp"
 #include "ball_sim/scene.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// The arithmetic a method runs in. long_double (64-bit significand on x86-64) is slower and there
 /// to tell rounding from error: what does not shrink with it is a bug, not rounding.
@@ -32,4 +32,4 @@ MethodChoice chooseMethod(const std::string& name, const Scene& scene);
 std::unique_ptr<Method> makeMethod(const std::string& name, const Surroundings& surroundings,
                                    Precision precision = Precision::double_precision);
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

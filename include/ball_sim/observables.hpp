@@ -8,7 +8,7 @@
 #include "ball_sim/ball.hpp"
 #include "ball_sim/surroundings.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// Sum of m v^2 / 2 over balls of finite mass, J.
 /// @param masses  kg, one a ball, in the order of `states`
@@ -24,4 +24,4 @@ Vector3 momentum(const BallStates& states, const std::vector<double>& masses);
 /// FNV-1a over the bits of ids, places and velocities: equal states, equal hash.
 std::uint64_t stateHash(const BallStates& states);
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

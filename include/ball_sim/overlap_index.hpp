@@ -11,7 +11,7 @@
 #include "ball_sim/surroundings.hpp"
 #include "ball_sim/vector.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// A set of balls to search for overlaps.
 ///
@@ -86,4 +86,4 @@ std::vector<std::optional<std::size_t>> overlapsAmong(const std::vector<Ball>& b
                                                       const std::vector<bool>& checked,
                                                       const Surroundings& surroundings);
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <random>
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// Seeded random numbers. The standard fixes what its engine gives but not what its distributions
 /// make of it, nor the last bit of a logarithm; so both are made here from + - * / and sqrt alone.
@@ -31,4 +31,4 @@ class RandomSource {
   std::mt19937_64 engine_;
 };
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

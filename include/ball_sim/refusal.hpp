@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// Why something was refused. The numbers are part of the ROS interface: append only.
 enum class RefusalCode : std::uint8_t {
@@ -39,4 +39,4 @@ class Refused : public std::runtime_error {
   RefusalCode code_;
 };
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

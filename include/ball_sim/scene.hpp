@@ -9,7 +9,7 @@
 #include "ball_sim/ball.hpp"
 #include "ball_sim/surroundings.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// A closed interval a value is drawn from evenly; lower == upper: that value.
 struct Range {
@@ -43,4 +43,4 @@ struct Scene {
   SimultaneousImpacts simultaneous_impacts = SimultaneousImpacts::sequential;
 };
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

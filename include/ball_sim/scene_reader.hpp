@@ -6,7 +6,7 @@
 
 #include "ball_sim/scene.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// A scene that was refused; what() reads "FILE:LINE: KEY: VALUE: RULE".
 class SceneError : public std::runtime_error {
@@ -21,4 +21,4 @@ Scene readScene(const std::string& path);
 /// The same from text. @param source what errors call it
 Scene parseScene(const std::string& text, const std::string& source);
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -8,7 +8,7 @@
 
 #include "ball_sim/vector.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// Axis-aligned box, m. A face at -infinity or +infinity is open. A box without height
 /// (min.z == max.z) makes the scene planar: every ball rolls at that z, with no z faces to hit.
@@ -41,4 +41,4 @@ using Partner = std::int64_t;
 constexpr Partner boxFace(int axis, bool upper) { return -1 - 2 * axis - (upper ? 1 : 0); }
 constexpr Partner planePartner(std::size_t index) { return -7 - static_cast<Partner>(index); }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

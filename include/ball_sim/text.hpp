@@ -6,7 +6,7 @@
 
 #include "ball_sim/vector.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// The shortest decimal text that reads back as the same double: "0.05", "-inf", "nan".
 std::string formatNumber(double value);
@@ -18,4 +18,4 @@ std::string formatVector(const Vector3& vector);
 /// any other text, infinities and NaN included, and for numbers too large for a double.
 std::optional<double> parseDecimal(const std::string& text);
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// An instant of simulated time.
 ///
@@ -71,4 +71,4 @@ class Time {
   double fraction_ = 0;     // s, in [0, 1)
 };
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

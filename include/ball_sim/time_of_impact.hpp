@@ -13,7 +13,7 @@
 
 #include "ball_sim/vector.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// "Never", as a time.
 template <class Real>
@@ -148,4 +148,4 @@ Real timeOfImpactAccelerated(const VectorOf<Real>& dx, const VectorOf<Real>& dv,
   return kNever<Real>;
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// 3-vector over any floating-point type; storage without alignment demands, so it fits anywhere.
 template <class Real>
@@ -31,4 +31,4 @@ Real crossSquared(const VectorOf<Real>& a, const VectorOf<Real>& b) {
   return x * x + y * y + z * z;
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

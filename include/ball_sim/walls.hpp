@@ -8,7 +8,7 @@
 #include "ball_sim/surroundings.hpp"
 #include "ball_sim/vector.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// A rigid wall at rest: inside is normal.x >= offset.
 template <class Real>
@@ -158,4 +158,4 @@ VectorOf<Real> settleContacts(RestingContacts& contacts, VectorOf<Real>& v, Real
   return a;
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

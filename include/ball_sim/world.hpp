@@ -18,7 +18,7 @@
 #include "ball_sim/refusal.hpp"
 #include "ball_sim/scene.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// What became of a request to add balls: all of them, or none.
 struct SpawnResult {
@@ -127,4 +127,4 @@ class World {
   CollisionLog* log_ = nullptr;
 };
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -8,7 +8,7 @@
 #include "ball_sim/limits.hpp"
 #include "ball_sim/text.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace {
 
 constexpr const char* kAxisNames[] = {"x", "y", "z"};
@@ -191,4 +191,4 @@ std::string overlapText(const std::string& other, double distance, double reach)
   return "overlaps " + other + text;
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

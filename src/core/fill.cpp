@@ -10,7 +10,7 @@
 #include "ball_sim/text.hpp"
 #include "packing.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
@@ -144,4 +144,4 @@ std::vector<Ball> populate(Scene& scene) {
   return balls;
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -6,7 +6,7 @@
 #include "ball_sim/brute_force.hpp"
 #include "event_driven/make_event_driven.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 namespace {
 
@@ -44,4 +44,4 @@ std::unique_ptr<Method> makeMethod(const std::string& name, const Surroundings& 
   return std::make_unique<BruteForce<long double>>(surroundings);
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

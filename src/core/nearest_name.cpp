@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <numeric>
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace {
 
 // Fewest insertions, deletions and substitutions from a to b. Source: Levenshtein (1966); Wagner,
@@ -43,4 +43,4 @@ std::optional<std::string> nearestName(const std::string& name,
   return nearest;
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

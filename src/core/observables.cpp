@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstring>
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace {
 
 // Adds with a running correction for what rounding lost. Source: Neumaier, "Rundungsfehleranalyse
@@ -89,4 +89,4 @@ std::uint64_t stateHash(const BallStates& states) {
   return hash.value();
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -8,7 +8,7 @@
 
 #include "ball_sim/ball_check.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace {
 
 // Cells further out than this share the outermost: places there are coarser than a cell anyway.
@@ -193,4 +193,4 @@ std::vector<std::optional<std::size_t>> overlapsAmong(const std::vector<Ball>& b
   return found;
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

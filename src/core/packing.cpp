@@ -13,7 +13,7 @@
 #include "packing_relaxation.hpp"
 #include "packing_room.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
@@ -151,4 +151,4 @@ void placeBalls(std::vector<Ball>& balls, const Surroundings& surroundings,
                      " of the box): take fewer or smaller balls, or a larger box");
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

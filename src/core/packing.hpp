@@ -7,7 +7,7 @@
 #include "ball_sim/random_source.hpp"
 #include "ball_sim/surroundings.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// Gives each of `balls` a random place inside `surroundings`, where it overlaps neither another
 /// nor one of `present`.
@@ -16,4 +16,4 @@ namespace ball_sim {
 void placeBalls(std::vector<Ball>& balls, const Surroundings& surroundings,
                 const std::vector<Ball>& present, RandomSource& random);
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -9,7 +9,7 @@
 #include "ball_sim/ball_check.hpp"
 #include "packing_room.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace {
 
 // How close-packed layers are built and piled up; lengths in units of the spacing of neighbours.
@@ -219,4 +219,4 @@ bool placeOnLattice(std::vector<Ball>& balls, const Surroundings& surroundings,
   return false;
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

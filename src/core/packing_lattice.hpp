@@ -7,7 +7,7 @@
 #include "ball_sim/random_source.hpp"
 #include "ball_sim/surroundings.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// Puts equal balls on random sites of the close-packed lattice with the widest spacing that has
 /// enough of them, stretched to fill the box, and shifts each at random within its gap.
@@ -20,4 +20,4 @@ namespace ball_sim {
 bool placeOnLattice(std::vector<Ball>& balls, const Surroundings& surroundings,
                     const std::vector<Ball>& present, RandomSource& random);
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

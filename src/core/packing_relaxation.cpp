@@ -7,7 +7,7 @@
 #include "ball_sim/ball_check.hpp"
 #include "packing_room.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace {
 
 // Balls are kept this share of their radius further apart than they need be: otherwise the last
@@ -136,4 +136,4 @@ std::size_t relax(std::vector<Ball>& balls, const Surroundings& surroundings,
   return balls.size() - fewest;
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

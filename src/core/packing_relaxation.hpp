@@ -8,7 +8,7 @@
 #include "ball_sim/random_source.hpp"
 #include "ball_sim/surroundings.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// Starts from places drawn evenly and pushes every overlapping pair apart, sweep after sweep.
 ///
@@ -19,4 +19,4 @@ namespace ball_sim {
 std::size_t relax(std::vector<Ball>& balls, const Surroundings& surroundings,
                   const std::vector<Ball>& present, RandomSource& random);
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <numeric>
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 Box centresWithin(const Surroundings& surroundings, double radius) {
   Box room = surroundings.box;
@@ -33,4 +33,4 @@ OverlapIndex indexOf(const std::vector<Ball>& balls, const Surroundings& surroun
   return index;
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -8,7 +8,7 @@
 #include "ball_sim/overlap_index.hpp"
 #include "ball_sim/surroundings.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 inline int axesOf(const Surroundings& surroundings) { return surroundings.planar() ? 2 : 3; }
 
@@ -22,4 +22,4 @@ std::vector<std::size_t> bySize(const std::vector<Ball>& balls);
 OverlapIndex indexOf(const std::vector<Ball>& balls, const Surroundings& surroundings,
                      std::size_t first = 0);
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

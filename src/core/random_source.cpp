@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace {
 
 // Natural logarithm from its series in t = (m - 1)/(m + 1), |t| < 0.172: 2 (t + t^3/3 + ...); what
@@ -44,4 +44,4 @@ std::uint64_t RandomSource::below(std::uint64_t count) {
   }
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

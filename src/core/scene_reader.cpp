@@ -20,7 +20,7 @@
 #include "ball_sim/text.hpp"
 #include "yaml_field.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace {
 
 // More than these would be a slip, and would take the machine down before anything moved.
@@ -370,4 +370,4 @@ Scene parseScene(const std::string& text, const std::string& source) {
   }
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -6,7 +6,7 @@
 #include <locale>
 #include <sstream>
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 std::string formatNumber(double value) {
   char text[32];
@@ -35,4 +35,4 @@ std::optional<double> parseDecimal(const std::string& text) {
   return value;
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

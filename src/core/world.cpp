@@ -11,7 +11,7 @@
 #include "ball_sim/overlap_index.hpp"
 #include "ball_sim/text.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace {
 
 constexpr double kLargestId = std::numeric_limits<BallId>::max();
@@ -258,19 +258,19 @@ void World::reset(bool restart_time) {
 double World::kineticEnergy() const {
   BallStates states;
   read(states);
-  return ball_sim::kineticEnergy(states, masses_);
+  return core::kineticEnergy(states, masses_);
 }
 
 double World::potentialEnergy() const {
   BallStates states;
   read(states);
-  return ball_sim::potentialEnergy(states, masses_, surroundings().gravity);
+  return core::potentialEnergy(states, masses_, surroundings().gravity);
 }
 
 Vector3 World::momentum() const {
   BallStates states;
   read(states);
-  return ball_sim::momentum(states, masses_);
+  return core::momentum(states, masses_);
 }
 
 void World::setCollisionLog(CollisionLog* log) {
@@ -278,4 +278,4 @@ void World::setCollisionLog(CollisionLog* log) {
   method_->setCollisionLog(log);
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

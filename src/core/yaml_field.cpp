@@ -11,7 +11,7 @@
 #include "ball_sim/text.hpp"
 #include "nearest_name.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace {
 
 constexpr std::size_t kLongestValueShown = 60;
@@ -180,4 +180,4 @@ YamlField YamlField::require(const std::string& name) const {
   throw SceneError(place(source_, node_) + below(name) + ": nothing: the key is required");
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

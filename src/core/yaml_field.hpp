@@ -10,7 +10,7 @@
 
 #include "ball_sim/vector.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// A value and its place: file, line, key. All readers throw SceneError "FILE:LINE: KEY: VALUE:
 /// RULE" when the value is not of the type asked for.
@@ -68,4 +68,4 @@ class YamlField {
   YAML::Node node_;
 };
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

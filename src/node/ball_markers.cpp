@@ -77,7 +77,7 @@ void BallMarkers::setBalls(const std::vector<double>& radii,
   setColors(colors);
 }
 
-const visualization_msgs::MarkerArray& BallMarkers::update(const BallStates& states,
+const visualization_msgs::MarkerArray& BallMarkers::update(const core::BallStates& states,
                                                            const std_msgs::Header& header) {
   for (Marker& marker : array_.markers) {
     marker.header = header;

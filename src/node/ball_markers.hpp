@@ -30,7 +30,7 @@ class BallMarkers {
 
   /// Puts the balls in their places. The array stays valid until the next call.
   /// @param states  of the balls last set, in the same order
-  const visualization_msgs::MarkerArray& update(const BallStates& states,
+  const visualization_msgs::MarkerArray& update(const core::BallStates& states,
                                                 const std_msgs::Header& header);
 
  private:

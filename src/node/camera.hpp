@@ -9,10 +9,10 @@ namespace ball_sim {
 
 /// A camera that looks at a point from a distance, as RViz's orbit view has it.
 struct Camera {
-  Vector3 focus = Vector3::Zero();  ///< m
-  double distance = 1;              ///< m, from the focus
-  double yaw = 0;                   ///< rad, of the camera seen from the focus, about z from x
-  double pitch = 0;                 ///< rad, above the horizon
+  core::Vector3 focus = core::Vector3::Zero();  ///< m
+  double distance = 1;                          ///< m, from the focus
+  double yaw = 0;    ///< rad, of the camera seen from the focus, about z from x
+  double pitch = 0;  ///< rad, above the horizon
 };
 
 /// An axis-aligned box that grows with what is put into it; empty at first.
@@ -25,14 +25,14 @@ class Bounds {
   void include(const visualization_msgs::MarkerArray& markers);
 
   bool empty() const { return !(min_.x() <= max_.x()); }
-  const Vector3& min() const { return min_; }  ///< m
-  const Vector3& max() const { return max_; }  ///< m
+  const core::Vector3& min() const { return min_; }  ///< m
+  const core::Vector3& max() const { return max_; }  ///< m
 
  private:
-  void include(const Vector3& point, double margin);
+  void include(const core::Vector3& point, double margin);
 
-  Vector3 min_;
-  Vector3 max_;
+  core::Vector3 min_;
+  core::Vector3 max_;
 };
 
 /// Looks at the middle, from as near as shows all corners.

@@ -47,7 +47,7 @@ constexpr std::array<std::array<double, 3>, 16> kFirstColors{{{0.96, 0.95, 0.90}
                                                               {0.55, 1.00, 0.75},
                                                               {0.95, 0.35, 0.75}}};
 
-Color idColor(BallId id) {
+Color idColor(core::BallId id) {
   if (id < kFirstColors.size()) {
     const auto& c = kFirstColors[id];
     return rgb(c[0], c[1], c[2]);
@@ -93,7 +93,7 @@ std::optional<ColorBy> colorByName(const std::string& name) {
                               : std::optional(static_cast<ColorBy>(found - names.begin()));
 }
 
-std::vector<Color> lastingColors(ColorBy color_by, const std::vector<BallId>& ids,
+std::vector<Color> lastingColors(ColorBy color_by, const std::vector<core::BallId>& ids,
                                  const std::vector<double>& radii,
                                  const std::vector<double>& masses) {
   std::vector<Color> colors;
@@ -113,17 +113,17 @@ std::vector<Color> lastingColors(ColorBy color_by, const std::vector<BallId>& id
   return colors;
 }
 
-void speedColors(const std::vector<Vector3>& velocities, std::vector<Color>& colors) {
+void speedColors(const std::vector<core::Vector3>& velocities, std::vector<Color>& colors) {
   double sum = 0;
-  for (const Vector3& velocity : velocities) {
-    sum += dot(velocity, velocity);
+  for (const core::Vector3& velocity : velocities) {
+    sum += core::dot(velocity, velocity);
   }
   const double full_speed =
       2 * std::sqrt(sum / static_cast<double>(std::max<std::size_t>(velocities.size(), 1)));
   colors.clear();
-  for (const Vector3& velocity : velocities) {
+  for (const core::Vector3& velocity : velocities) {
     colors.push_back(
-        rampColor(full_speed > 0 ? std::sqrt(dot(velocity, velocity)) / full_speed : 0));
+        rampColor(full_speed > 0 ? std::sqrt(core::dot(velocity, velocity)) / full_speed : 0));
   }
 }
 

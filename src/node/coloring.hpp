@@ -27,13 +27,15 @@ std::optional<ColorBy> colorByName(const std::string& name);
 /// change; see speedColors().
 /// @param radii   m, one a ball in the order of `ids`
 /// @param masses  kg, the same
-std::vector<std_msgs::ColorRGBA> lastingColors(ColorBy color_by, const std::vector<BallId>& ids,
+std::vector<std_msgs::ColorRGBA> lastingColors(ColorBy color_by,
+                                               const std::vector<core::BallId>& ids,
                                                const std::vector<double>& radii,
                                                const std::vector<double>& masses);
 
 /// From blue (at rest) to red (twice the root mean square speed of the moment, or more).
 /// @param velocities  m/s
 /// @param colors      one a ball; reuses its memory
-void speedColors(const std::vector<Vector3>& velocities, std::vector<std_msgs::ColorRGBA>& colors);
+void speedColors(const std::vector<core::Vector3>& velocities,
+                 std::vector<std_msgs::ColorRGBA>& colors);
 
 }  // namespace ball_sim

@@ -3,36 +3,38 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ball_sim/Code.h"
 #include "ball_sim/world.hpp"
 
 namespace ball_sim {
 namespace {
 
 // The numbers of the ROS interface are those of the core.
-constexpr bool same(std::uint8_t code, RefusalCode core) {
-  return code == static_cast<std::uint8_t>(core);
+constexpr bool same(std::uint8_t code, core::RefusalCode reason) {
+  return code == static_cast<std::uint8_t>(reason);
 }
-static_assert(same(Code::NONE, RefusalCode::none), "Code.msg");
-static_assert(same(Code::NOT_FINITE, RefusalCode::not_finite), "Code.msg");
-static_assert(same(Code::OUT_OF_RANGE, RefusalCode::out_of_range), "Code.msg");
-static_assert(same(Code::OUTSIDE, RefusalCode::outside), "Code.msg");
-static_assert(same(Code::OVERLAP, RefusalCode::overlap), "Code.msg");
-static_assert(same(Code::BALL_LIMIT, RefusalCode::ball_limit), "Code.msg");
-static_assert(same(Code::UNKNOWN_BALL, RefusalCode::unknown_ball), "Code.msg");
-static_assert(same(Code::FIXED_BALL, RefusalCode::fixed_ball), "Code.msg");
-static_assert(same(Code::NOT_PLANAR, RefusalCode::not_planar), "Code.msg");
-static_assert(same(Code::REJECTED_WITH_OTHERS, RefusalCode::rejected_with_others), "Code.msg");
+static_assert(same(Code::NONE, core::RefusalCode::none), "Code.msg");
+static_assert(same(Code::NOT_FINITE, core::RefusalCode::not_finite), "Code.msg");
+static_assert(same(Code::OUT_OF_RANGE, core::RefusalCode::out_of_range), "Code.msg");
+static_assert(same(Code::OUTSIDE, core::RefusalCode::outside), "Code.msg");
+static_assert(same(Code::OVERLAP, core::RefusalCode::overlap), "Code.msg");
+static_assert(same(Code::BALL_LIMIT, core::RefusalCode::ball_limit), "Code.msg");
+static_assert(same(Code::UNKNOWN_BALL, core::RefusalCode::unknown_ball), "Code.msg");
+static_assert(same(Code::FIXED_BALL, core::RefusalCode::fixed_ball), "Code.msg");
+static_assert(same(Code::NOT_PLANAR, core::RefusalCode::not_planar), "Code.msg");
+static_assert(same(Code::REJECTED_WITH_OTHERS, core::RefusalCode::rejected_with_others),
+              "Code.msg");
 
-static_assert(CollisionMessage::X_MIN == boxFace(0, false), "Collision.msg");
-static_assert(CollisionMessage::X_MAX == boxFace(0, true), "Collision.msg");
-static_assert(CollisionMessage::Y_MIN == boxFace(1, false), "Collision.msg");
-static_assert(CollisionMessage::Y_MAX == boxFace(1, true), "Collision.msg");
-static_assert(CollisionMessage::Z_MIN == boxFace(2, false), "Collision.msg");
-static_assert(CollisionMessage::Z_MAX == boxFace(2, true), "Collision.msg");
-static_assert(CollisionMessage::FIRST_PLANE == planePartner(0), "Collision.msg");
+static_assert(Collision::X_MIN == core::boxFace(0, false), "Collision.msg");
+static_assert(Collision::X_MAX == core::boxFace(0, true), "Collision.msg");
+static_assert(Collision::Y_MIN == core::boxFace(1, false), "Collision.msg");
+static_assert(Collision::Y_MAX == core::boxFace(1, true), "Collision.msg");
+static_assert(Collision::Z_MIN == core::boxFace(2, false), "Collision.msg");
+static_assert(Collision::Z_MAX == core::boxFace(2, true), "Collision.msg");
+static_assert(Collision::FIRST_PLANE == core::planePartner(0), "Collision.msg");
 
 template <class Message>
-Message fromVector(const Vector3& vector) {
+Message fromVector(const core::Vector3& vector) {
   Message message;
   message.x = vector.x();
   message.y = vector.y();
@@ -42,19 +44,21 @@ Message fromVector(const Vector3& vector) {
 
 }  // namespace
 
-geometry_msgs::Point toPoint(const Vector3& vector) {
+geometry_msgs::Point toPoint(const core::Vector3& vector) {
   return fromVector<geometry_msgs::Point>(vector);
 }
 
-geometry_msgs::Vector3 toVector(const Vector3& vector) {
+geometry_msgs::Vector3 toVector(const core::Vector3& vector) {
   return fromVector<geometry_msgs::Vector3>(vector);
 }
 
-Vector3 fromMessage(const geometry_msgs::Point& point) { return {point.x, point.y, point.z}; }
+core::Vector3 fromMessage(const geometry_msgs::Point& point) { return {point.x, point.y, point.z}; }
 
-Vector3 fromMessage(const geometry_msgs::Vector3& vector) { return {vector.x, vector.y, vector.z}; }
+core::Vector3 fromMessage(const geometry_msgs::Vector3& vector) {
+  return {vector.x, vector.y, vector.z};
+}
 
-void fillMessage(const BallStates& states, BallStatesMessage& message) {
+void fillMessage(const core::BallStates& states, BallStates& message) {
   message.ids = states.ids;
   message.positions.resize(states.positions.size());
   message.velocities.resize(states.velocities.size());
@@ -64,7 +68,7 @@ void fillMessage(const BallStates& states, BallStatesMessage& message) {
                  toVector);
 }
 
-void fillStates(const BallStatesMessage& message, BallStates& states) {
+void fillStates(const BallStates& message, core::BallStates& states) {
   states.ids = message.ids;
   states.positions.clear();
   states.velocities.clear();
@@ -76,8 +80,8 @@ void fillStates(const BallStatesMessage& message, BallStates& states) {
   }
 }
 
-CollisionMessage toMessage(const Collision& collision, std::int64_t start) {
-  CollisionMessage message;
+Collision toMessage(const core::Collision& collision, std::int64_t start) {
+  Collision message;
   message.stamp = toStamp(start + collision.time.nanoseconds());
   message.a = collision.a;
   message.b = collision.b;

@@ -4,26 +4,27 @@
 #include <cstdint>
 #include <vector>
 
+#include "ball_sim/BallStates.h"
+#include "ball_sim/Collision.h"
 #include "ball_sim/ball.hpp"
 #include "ball_sim/method.hpp"
-#include "messages.hpp"
 
 namespace ball_sim {
 
-geometry_msgs::Point toPoint(const Vector3& vector);
-geometry_msgs::Vector3 toVector(const Vector3& vector);
-Vector3 fromMessage(const geometry_msgs::Point& point);
-Vector3 fromMessage(const geometry_msgs::Vector3& vector);
+geometry_msgs::Point toPoint(const core::Vector3& vector);
+geometry_msgs::Vector3 toVector(const core::Vector3& vector);
+core::Vector3 fromMessage(const geometry_msgs::Point& point);
+core::Vector3 fromMessage(const geometry_msgs::Vector3& vector);
 
 /// Fills all but the header, and reuses the message's memory.
-void fillMessage(const BallStates& states, BallStatesMessage& message);
+void fillMessage(const core::BallStates& states, BallStates& message);
 
 /// The way back. The time is left alone; reuses the memory of `states`.
 /// @param message  with as many positions and velocities as ids
-void fillStates(const BallStatesMessage& message, BallStates& states);
+void fillStates(const BallStates& message, core::BallStates& states);
 
 /// @param start  ROS time of simulated time 0, ns
-CollisionMessage toMessage(const Collision& collision, std::int64_t start);
+Collision toMessage(const core::Collision& collision, std::int64_t start);
 
 /// @param nanoseconds  ns, >= 0
 /// @throws std::runtime_error  beyond the year 2106, where ROS time ends

@@ -18,7 +18,7 @@ Outputs::Outputs(ros::NodeHandle& private_node, const Parameters& parameters)
   if (parameters.publish_clock) {
     clock_ = private_node.advertise<rosgraph_msgs::Clock>("/clock", kRecorded);
   }
-  states_ = private_node.advertise<BallStatesMessage>("ball_states", kRecorded);
+  states_ = private_node.advertise<BallStates>("ball_states", kRecorded);
   properties_ = private_node.advertise<BallProperties>("ball_properties", kRecorded, kLatched);
   markers_ = private_node.advertise<visualization_msgs::MarkerArray>("markers", kShown);
   scene_markers_ =
@@ -35,7 +35,7 @@ void Outputs::publishClock(ros::Time stamp) {
   }
 }
 
-void Outputs::publishStates(const World& world, ros::Time stamp) {
+void Outputs::publishStates(const core::World& world, ros::Time stamp) {
   if (states_.getNumSubscribers() == 0) {
     return;
   }
@@ -45,7 +45,7 @@ void Outputs::publishStates(const World& world, ros::Time stamp) {
   states_.publish(states_message_);
 }
 
-void Outputs::publishMarkers(const World& world, ros::Time stamp) {
+void Outputs::publishMarkers(const core::World& world, ros::Time stamp) {
   if (markers_.getNumSubscribers() == 0) {
     return;
   }
@@ -53,7 +53,7 @@ void Outputs::publishMarkers(const World& world, ros::Time stamp) {
   markers_.publish(ball_markers_.update(read_, header(stamp)));
 }
 
-void Outputs::publishProperties(const World& world, ros::Time stamp) {
+void Outputs::publishProperties(const core::World& world, ros::Time stamp) {
   properties_message_.header = header(stamp);
   properties_message_.ids = world.ids();
   properties_message_.radii = world.radii();
@@ -64,7 +64,7 @@ void Outputs::publishProperties(const World& world, ros::Time stamp) {
   properties_.publish(properties_message_);
 }
 
-void Outputs::publishSceneMarkers(const World& world) {
+void Outputs::publishSceneMarkers(const core::World& world) {
   world.read(read_);
   scene_message_ = sceneMarkers(world.surroundings(), read_, world.radii(), frame_id_);
   scene_markers_.publish(scene_message_);
@@ -79,14 +79,15 @@ void Outputs::repeatLatched() {
   }
 }
 
-std::uint64_t Outputs::publishCollisions(CollisionLog& log, std::int64_t start, ros::Time stamp) {
+std::uint64_t Outputs::publishCollisions(core::CollisionLog& log, std::int64_t start,
+                                         ros::Time stamp) {
   const std::uint64_t dropped = log.dropped;
   if (!log.entries.empty() || dropped > 0) {
     Collisions message;
     message.header = header(stamp);
     message.dropped = static_cast<std::uint32_t>(dropped);
     message.collisions.reserve(log.entries.size());
-    for (const Collision& collision : log.entries) {
+    for (const core::Collision& collision : log.entries) {
       message.collisions.push_back(toMessage(collision, start));
     }
     collisions_.publish(message);

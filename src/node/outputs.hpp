@@ -8,10 +8,13 @@
 #include <string>
 
 #include "ball_markers.hpp"
+#include "ball_sim/BallProperties.h"
+#include "ball_sim/BallStates.h"
+#include "ball_sim/Collisions.h"
+#include "ball_sim/SimStats.h"
 #include "ball_sim/method.hpp"
 #include "ball_sim/world.hpp"
 #include "coloring.hpp"
-#include "messages.hpp"
 #include "parameters.hpp"
 
 namespace ball_sim {
@@ -30,16 +33,16 @@ class Outputs {
   void publishClock(ros::Time stamp);
 
   /// ~ball_states.
-  void publishStates(const World& world, ros::Time stamp);
+  void publishStates(const core::World& world, ros::Time stamp);
 
   /// ~markers.
-  void publishMarkers(const World& world, ros::Time stamp);
+  void publishMarkers(const core::World& world, ros::Time stamp);
 
   /// ~ball_properties, when the set of balls has changed.
-  void publishProperties(const World& world, ros::Time stamp);
+  void publishProperties(const core::World& world, ros::Time stamp);
 
   /// ~scene_markers, at the start.
-  void publishSceneMarkers(const World& world);
+  void publishSceneMarkers(const core::World& world);
 
   /// ~ball_properties and ~scene_markers once more, as they were.
   void repeatLatched();
@@ -51,7 +54,7 @@ class Outputs {
   /// ~collisions, unless nothing has happened. Empties the log.
   /// @param start  ROS time of simulated time 0, ns
   /// @return how many impacts were left out
-  std::uint64_t publishCollisions(CollisionLog& log, std::int64_t start, ros::Time stamp);
+  std::uint64_t publishCollisions(core::CollisionLog& log, std::int64_t start, ros::Time stamp);
 
  private:
   std_msgs::Header header(ros::Time stamp) const;
@@ -67,8 +70,8 @@ class Outputs {
   ros::Publisher stats_;
 
   // Kept for their memory.
-  BallStates read_;
-  BallStatesMessage states_message_;
+  core::BallStates read_;
+  BallStates states_message_;
   BallProperties properties_message_;
   visualization_msgs::MarkerArray scene_message_;
   BallMarkers ball_markers_;

@@ -122,8 +122,8 @@ class Reader {
     const bool good = (zero_too && number == 0) || (number >= lower && number <= upper);
     if (!good) {  // NaN too
       refuse(name, *value,
-             "must be a number, " + std::string(zero_too ? "0 or " : "") + formatNumber(lower) +
-                 " to " + formatNumber(upper));
+             "must be a number, " + std::string(zero_too ? "0 or " : "") +
+                 core::formatNumber(lower) + " to " + core::formatNumber(upper));
     }
     return number;
   }

@@ -32,18 +32,18 @@ const std_msgs::ColorRGBA kEdge = rgba(0.75F, 0.78F, 0.82F);
 
 /// Axis-aligned, finite.
 struct Extent {
-  Vector3 min;
-  Vector3 max;
+  core::Vector3 min;
+  core::Vector3 max;
 
-  Vector3 centre() const { return (min + max) / 2; }
-  Vector3 size() const { return max - min; }
+  core::Vector3 centre() const { return (min + max) / 2; }
+  core::Vector3 size() const { return max - min; }
 };
 
 /// What balls and closed faces span.
-Extent extentOf(const Surroundings& surroundings, const BallStates& balls,
+Extent extentOf(const core::Surroundings& surroundings, const core::BallStates& balls,
                 const std::vector<double>& radii) {
-  Extent extent{Vector3::Constant(std::numeric_limits<double>::infinity()),
-                Vector3::Constant(-std::numeric_limits<double>::infinity())};
+  Extent extent{core::Vector3::Constant(std::numeric_limits<double>::infinity()),
+                core::Vector3::Constant(-std::numeric_limits<double>::infinity())};
   const auto include = [&](int axis, double value) {
     extent.min[axis] = std::min(extent.min[axis], value);
     extent.max[axis] = std::max(extent.max[axis], value);
@@ -69,7 +69,7 @@ Extent extentOf(const Surroundings& surroundings, const BallStates& balls,
 /// Collects the markers of one scene.
 class Builder {
  public:
-  Builder(const Surroundings& surroundings, const BallStates& balls,
+  Builder(const core::Surroundings& surroundings, const core::BallStates& balls,
           const std::vector<double>& radii, std::string frame_id)
       : surroundings_(surroundings),
         extent_(extentOf(surroundings, balls, radii)),
@@ -86,7 +86,7 @@ class Builder {
       addFloor();
       addEdges();
     }
-    for (const Plane& plane : surroundings_.planes) {
+    for (const core::Plane& plane : surroundings_.planes) {
       addPlane(plane);
     }
     return std::move(array_);
@@ -106,8 +106,8 @@ class Builder {
     return array_.markers.back();
   }
 
-  Marker& addBlock(const std::string& name, const std_msgs::ColorRGBA& color, const Vector3& centre,
-                   const Vector3& size) {
+  Marker& addBlock(const std::string& name, const std_msgs::ColorRGBA& color,
+                   const core::Vector3& centre, const core::Vector3& size) {
     Marker& marker = add(Marker::CUBE, name, color);
     marker.pose.position = toPoint(centre);
     marker.scale = toVector(size);
@@ -115,7 +115,7 @@ class Builder {
   }
 
   bool closed(int axis, bool upper) const {
-    const Box& box = surroundings_.box;
+    const core::Box& box = surroundings_.box;
     return !surroundings_.periodic && std::isfinite(upper ? box.max[axis] : box.min[axis]);
   }
 
@@ -168,7 +168,7 @@ class Builder {
     const int along = 1 - axis;
     const double width = cushionWidth();
     const auto corner = [&](double end, double outwards) {
-      Vector3 point;
+      core::Vector3 point;
       point[axis] = upper ? table_.max[axis] + outwards : table_.min[axis] - outwards;
       point[along] = end;
       point.z() = tableTop() + cushionHeight() * outwards / width;
@@ -176,8 +176,8 @@ class Builder {
     };
     const double low = table_.min[along];
     const double high = table_.max[along];
-    std::array<Vector3, 4> corners{corner(low, 0), corner(high, 0), corner(high + width, width),
-                                   corner(low - width, width)};
+    std::array<core::Vector3, 4> corners{corner(low, 0), corner(high, 0),
+                                         corner(high + width, width), corner(low - width, width)};
     if ((corners[1] - corners[0]).cross(corners[2] - corners[0]).z() < 0) {
       std::reverse(corners.begin(), corners.end());  // counter-clockwise seen from above
     }
@@ -195,11 +195,11 @@ class Builder {
     const double width = 1.6 * offset;
     const double top = tableTop() + 1.1 * cushionHeight();
     const double bottom = tableTop() - tableThickness();
-    Vector3 centre = table_.centre();
+    core::Vector3 centre = table_.centre();
     centre[axis] =
         upper ? table_.max[axis] + offset + width / 2 : table_.min[axis] - offset - width / 2;
     centre.z() = (top + bottom) / 2;
-    Vector3 size;
+    core::Vector3 size;
     size[axis] = width;
     size[along] = table_.size()[along] + 2 * offset + (axis == 0 ? 2 * width : 0);
     size.z() = top - bottom;
@@ -218,7 +218,7 @@ class Builder {
 
   /// The edges of the box between finite corners.
   void addEdges() {
-    const Box& box = surroundings_.box;
+    const core::Box& box = surroundings_.box;
     std::vector<geometry_msgs::Point> points;
     for (int axis = 0; axis < 3; ++axis) {
       const int u = (axis + 1) % 3;
@@ -226,7 +226,7 @@ class Builder {
       for (const double at_u : {box.min[u], box.max[u]}) {
         for (const double at_v : {box.min[v], box.max[v]}) {
           if (std::isfinite(at_u) && std::isfinite(at_v)) {
-            Vector3 end;
+            core::Vector3 end;
             end[u] = at_u;
             end[v] = at_v;
             end[axis] = extent_.min[axis];
@@ -245,21 +245,22 @@ class Builder {
   }
 
   /// A slab behind the plane. Floors are opaque; walls and ceilings let the balls be seen.
-  void addPlane(const Plane& plane) {
+  void addPlane(const core::Plane& plane) {
     const double length = 1.5 * extent_.size().maxCoeff();
     const double thickness = 0.01 * length;
-    const Vector3 middle = extent_.centre();
-    const double inside = dot(plane.normal, middle) - plane.offset;  // m from the plane
-    Vector3 centre = middle - plane.normal * (inside + thickness / 2);
-    Vector3 size{length, length, thickness};
+    const core::Vector3 middle = extent_.centre();
+    const double inside = core::dot(plane.normal, middle) - plane.offset;  // m from the plane
+    core::Vector3 centre = middle - plane.normal * (inside + thickness / 2);
+    core::Vector3 size{length, length, thickness};
     std_msgs::ColorRGBA color = plane.normal.z() > 0.1 ? kFloor : kWall;
-    Eigen::Quaterniond turn = Eigen::Quaterniond::FromTwoVectors(Vector3::UnitZ(), plane.normal);
+    Eigen::Quaterniond turn =
+        Eigen::Quaterniond::FromTwoVectors(core::Vector3::UnitZ(), plane.normal);
     if (surroundings_.planar()) {  // a low wall on the table, its x axis upright
       size.x() = 3 * largest_radius_;
       centre.z() = tableTop() + size.x() / 2;
       color = kWood;
       Eigen::Matrix3d axes;
-      axes << Vector3::UnitZ(), plane.normal.cross(Vector3::UnitZ()), plane.normal;
+      axes << core::Vector3::UnitZ(), plane.normal.cross(core::Vector3::UnitZ()), plane.normal;
       turn = axes;
     }
     Marker& marker = addBlock("planes", color, centre, size);
@@ -269,7 +270,7 @@ class Builder {
     marker.pose.orientation.w = turn.w();
   }
 
-  const Surroundings& surroundings_;
+  const core::Surroundings& surroundings_;
   const Extent extent_;
   const std::string frame_id_;
   double largest_radius_ = 0;  // m
@@ -279,8 +280,8 @@ class Builder {
 
 }  // namespace
 
-visualization_msgs::MarkerArray sceneMarkers(const Surroundings& surroundings,
-                                             const BallStates& balls,
+visualization_msgs::MarkerArray sceneMarkers(const core::Surroundings& surroundings,
+                                             const core::BallStates& balls,
                                              const std::vector<double>& radii,
                                              const std::string& frame_id) {
   return Builder(surroundings, balls, radii, frame_id).build();

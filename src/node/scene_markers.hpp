@@ -17,8 +17,8 @@ namespace ball_sim {
 /// What is endless is drawn as far as balls and closed faces reach. Stamps are 0: valid whenever.
 /// @param balls  at the start, for the extent and the height of the table
 /// @param radii  m, in the order of `balls`
-visualization_msgs::MarkerArray sceneMarkers(const Surroundings& surroundings,
-                                             const BallStates& balls,
+visualization_msgs::MarkerArray sceneMarkers(const core::Surroundings& surroundings,
+                                             const core::BallStates& balls,
                                              const std::vector<double>& radii,
                                              const std::string& frame_id);
 

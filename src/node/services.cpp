@@ -45,13 +45,13 @@ std::string count(std::size_t number, const std::string& noun) {
 }
 
 /// Radius and mass of the first ball that can move.
-Ball firstMovableBall(const World& world) {
+core::Ball firstMovableBall(const core::World& world) {
   for (std::size_t i = 0; i < world.size(); ++i) {
     if (std::isfinite(world.masses()[i])) {
       return world.ball(world.ids()[i]);
     }
   }
-  Ball ball;
+  core::Ball ball;
   ball.radius = kDefaultRadius;
   ball.mass = kDefaultMass;
   return ball;
@@ -94,29 +94,30 @@ Services::~Services() {
 }
 
 bool Services::spawnBall(SpawnBall::Request& request, SpawnBall::Response& response) {
-  return fill(
-      perform([&](Answer&) {
-        const Ball ball = ballOf(request.position, request.velocity, request.radius, request.mass);
-        response.id = simulator_.world().spawn(ball);
-        simulator_.noteChange(true);
-        return "added ball " + std::to_string(response.id) + " at " + formatVector(ball.position);
-      }),
-      response);
+  return fill(perform([&](Answer&) {
+                const core::Ball ball =
+                    ballOf(request.position, request.velocity, request.radius, request.mass);
+                response.id = simulator_.world().spawn(ball);
+                simulator_.noteChange(true);
+                return "added ball " + std::to_string(response.id) + " at " +
+                       core::formatVector(ball.position);
+              }),
+              response);
 }
 
 bool Services::spawnBalls(SpawnBalls::Request& request, SpawnBalls::Response& response) {
   return fill(perform([&](Answer&) {
-                std::vector<Ball> balls;
-                for (const BallMessage& ball : request.balls) {
+                std::vector<core::Ball> balls;
+                for (const Ball& ball : request.balls) {
                   balls.push_back(ballOf(ball.position, ball.velocity, ball.radius, ball.mass));
                 }
-                const SpawnResult result = simulator_.world().spawn(balls);
-                for (const Refusal& refusal : result.refusals) {
+                const core::SpawnResult result = simulator_.world().spawn(balls);
+                for (const core::Refusal& refusal : result.refusals) {
                   response.codes.push_back(static_cast<std::uint8_t>(refusal.code));
                 }
                 for (std::size_t i = 0; i < result.refusals.size(); ++i) {
-                  const Refusal& refusal = result.refusals[i];
-                  if (refusal && refusal.code != RefusalCode::rejected_with_others) {
+                  const core::Refusal& refusal = result.refusals[i];
+                  if (refusal && refusal.code != core::RefusalCode::rejected_with_others) {
                     throw RequestRefused(static_cast<std::uint8_t>(refusal.code),
                                          "balls[" + std::to_string(i) + "]: " + refusal.reason);
                   }
@@ -134,7 +135,7 @@ bool Services::deleteBalls(DeleteBalls::Request& request, DeleteBalls::Response&
                   throw RequestRefused(Code::OUT_OF_RANGE,
                                        "ids: empty: name at least one ball, or set all");
                 }
-                World& world = simulator_.world();
+                core::World& world = simulator_.world();
                 const std::size_t before = world.size();
                 if (request.all) {
                   world.removeAll();
@@ -154,8 +155,8 @@ bool Services::applyImpulse(ApplyImpulse::Request& request, ApplyImpulse::Respon
     simulator_.noteChange(false);
     response.velocity_before = toVector(change.before);
     response.velocity_after = toVector(change.after);
-    return "ball " + std::to_string(request.id) + ": velocity " + formatVector(change.before) +
-           " -> " + formatVector(change.after) + " m/s";
+    return "ball " + std::to_string(request.id) + ": velocity " +
+           core::formatVector(change.before) + " -> " + core::formatVector(change.after) + " m/s";
   };
   if (request.at == 0) {
     return fill(perform(kick), response);
@@ -178,12 +179,12 @@ bool Services::step(Step::Request& request, Step::Response& response) {
                 const std::int64_t before = simulator_.now();
                 const bool whole = simulator_.step(stepTarget(request), until);
                 const double seconds = static_cast<double>(simulator_.now() - before) / 1e9;
-                const std::string message = "ran " + formatNumber(seconds) + " s";
+                const std::string message = "ran " + core::formatNumber(seconds) + " s";
                 if (whole) {
                   return message;
                 }
                 answer.code = Code::TIMED_OUT;
-                return message + ", then wall_timeout (" + formatNumber(wall_timeout_) +
+                return message + ", then wall_timeout (" + core::formatNumber(wall_timeout_) +
                        " s) ran out";
               }),
               response);
@@ -254,7 +255,7 @@ Services::Answer Services::perform(const Work& work, std::int64_t at) {
     try {
       answer.success = true;
       answer.message = work(answer);
-    } catch (const Refused& refused) {
+    } catch (const core::Refused& refused) {
       refuse(static_cast<std::uint8_t>(refused.code()), refused.what());
     } catch (const RequestRefused& refused) {
       refuse(refused.code(), refused.what());
@@ -267,7 +268,8 @@ Services::Answer Services::perform(const Work& work, std::int64_t at) {
     case CommandQueue::Outcome::done:
       break;
     case CommandQueue::Outcome::timed_out:
-      refuse(Code::TIMED_OUT, "not possible within wall_timeout (" + formatNumber(wall_timeout_) +
+      refuse(Code::TIMED_OUT, "not possible within wall_timeout (" +
+                                  core::formatNumber(wall_timeout_) +
                                   " s of wall time); withdrawn");
       break;
     case CommandQueue::Outcome::withdrawn:
@@ -283,9 +285,10 @@ CommandQueue::Clock::time_point Services::deadline() const {
 }
 
 /// Fills in the scene's defaults.
-Ball Services::ballOf(const geometry_msgs::Point& position, const geometry_msgs::Vector3& velocity,
-                      double radius, double mass) const {
-  Ball ball;
+core::Ball Services::ballOf(const geometry_msgs::Point& position,
+                            const geometry_msgs::Vector3& velocity, double radius,
+                            double mass) const {
+  core::Ball ball;
   ball.position = fromMessage(position);
   ball.velocity = fromMessage(velocity);
   ball.radius = radius == 0 ? default_ball_.radius : radius;
@@ -307,30 +310,32 @@ std::int64_t Services::stepTarget(const Step::Request& request) const {
   }
   if (!std::isfinite(request.seconds)) {
     throw RequestRefused(Code::NOT_FINITE,
-                         "seconds: " + formatNumber(request.seconds) + ": must be finite");
+                         "seconds: " + core::formatNumber(request.seconds) + ": must be finite");
   }
   if (request.seconds < kMinStep || request.seconds > kMaxStep) {
-    throw RequestRefused(Code::OUT_OF_RANGE, "seconds: " + formatNumber(request.seconds) +
-                                                 ": must be " + formatNumber(kMinStep) + " to " +
-                                                 formatNumber(kMaxStep));
+    throw RequestRefused(Code::OUT_OF_RANGE, "seconds: " + core::formatNumber(request.seconds) +
+                                                 ": must be " + core::formatNumber(kMinStep) +
+                                                 " to " + core::formatNumber(kMaxStep));
   }
   return simulator_.now() + toNanoseconds(request.seconds);
 }
 
 /// @param at  s, ROS time. @return simulated time, ns. @throws RequestRefused
 std::int64_t Services::impulseTime(double at) {
-  const std::string given = "at: " + formatNumber(at) + ": ";
+  const std::string given = "at: " + core::formatNumber(at) + ": ";
   if (!std::isfinite(at)) {
     throw RequestRefused(Code::NOT_FINITE, given + "must be finite");
   }
   constexpr double kEndOfRosTime = 4294967296.0;  // s
   if (at < 0 || at >= kEndOfRosTime) {
-    throw RequestRefused(Code::OUT_OF_RANGE, given + "must be 0 to " + formatNumber(kEndOfRosTime));
+    throw RequestRefused(Code::OUT_OF_RANGE,
+                         given + "must be 0 to " + core::formatNumber(kEndOfRosTime));
   }
   const std::int64_t time = toNanoseconds(at) - simulator_.start();
   if (time < simulator_.now()) {
-    throw RequestRefused(Code::IN_THE_PAST, given + "is in the past: it is " +
-                                                formatNumber(simulator_.stamp().toSec()) + " s");
+    throw RequestRefused(
+        Code::IN_THE_PAST,
+        given + "is in the past: it is " + core::formatNumber(simulator_.stamp().toSec()) + " s");
   }
   return time;
 }

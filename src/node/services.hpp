@@ -14,11 +14,12 @@
 #include <vector>
 
 #include "ball_sim/ApplyImpulse.h"
+#include "ball_sim/Code.h"
 #include "ball_sim/DeleteBalls.h"
 #include "ball_sim/Reset.h"
 #include "ball_sim/SpawnBall.h"
+#include "ball_sim/SpawnBalls.h"
 #include "ball_sim/Step.h"
-#include "messages.hpp"
 #include "simulator.hpp"
 
 namespace ball_sim {
@@ -54,14 +55,14 @@ class Services {
   Answer perform(const Work& work, std::int64_t at = CommandQueue::kNow);
   bool setPaused(const std::function<bool(bool)>& wanted, std_srvs::Trigger::Response& response);
   CommandQueue::Clock::time_point deadline() const;
-  Ball ballOf(const geometry_msgs::Point& position, const geometry_msgs::Vector3& velocity,
-              double radius, double mass) const;
+  core::Ball ballOf(const geometry_msgs::Point& position, const geometry_msgs::Vector3& velocity,
+                    double radius, double mass) const;
   std::int64_t stepTarget(const Step::Request& request) const;
   std::int64_t impulseTime(double at);
 
   Simulator& simulator_;
   const double wall_timeout_;  // s
-  Ball default_ball_;          // radius and mass of balls that give none
+  core::Ball default_ball_;    // radius and mass of balls that give none
 
   // Kicks to come block the thread that serves them; they have threads of their own, so that
   // everything else is answered meanwhile.

@@ -38,7 +38,7 @@ bool Periodic::due(Clock::time_point now) {
   return true;
 }
 
-Simulator::Simulator(const Parameters& parameters, World& world, Outputs& outputs,
+Simulator::Simulator(const Parameters& parameters, core::World& world, Outputs& outputs,
                      std::function<bool()> stop)
     : parameters_(parameters),
       world_(world),
@@ -125,13 +125,13 @@ bool Simulator::advance(std::int64_t target) {
 bool Simulator::moveTo(std::int64_t target) {
   const auto budget = static_cast<std::uint64_t>(parameters_.max_events_per_frame);
   moved_ = true;
-  if (world_.advanceTo(Time::fromNanoseconds(target), budget)) {
+  if (world_.advanceTo(core::Time::fromNanoseconds(target), budget)) {
     now_ = target;
     return true;
   }
   // Commands act on whole nanoseconds only: try to end on the next one.
   const std::int64_t next = world_.now().nanoseconds() + 1;
-  if (next < target && world_.advanceTo(Time::fromNanoseconds(next), budget)) {
+  if (next < target && world_.advanceTo(core::Time::fromNanoseconds(next), budget)) {
     now_ = next;
   }
   return false;
@@ -139,7 +139,7 @@ bool Simulator::moveTo(std::int64_t target) {
 
 /// Whether the world stands at now(); if not, it has gone further but not yet to the next whole
 /// nanosecond.
-bool Simulator::settled() const { return world_.now() == Time::fromNanoseconds(now_); }
+bool Simulator::settled() const { return world_.now() == core::Time::fromNanoseconds(now_); }
 
 void Simulator::serveCommands() {
   if (settled() && commands_.runDue(now_)) {
@@ -221,7 +221,7 @@ void Simulator::listen() {
 }
 
 SimStats Simulator::stats(Clock::time_point wall) {
-  const Statistics counts = world_.statistics();
+  const core::Statistics counts = world_.statistics();
   const double wall_seconds = std::chrono::duration<double>(wall - stats_wall_).count();
   const auto perWallSecond = [&](double amount) {
     return wall_seconds > 0 ? amount / wall_seconds : 0;

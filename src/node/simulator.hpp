@@ -49,14 +49,14 @@ class Simulator {
   using Clock = CommandQueue::Clock;
 
   /// @param stop  asked often; true ends run() and step()
-  Simulator(const Parameters& parameters, World& world, Outputs& outputs,
+  Simulator(const Parameters& parameters, core::World& world, Outputs& outputs,
             std::function<bool()> stop);
 
   /// Runs until stopped, then takes back all commands that still wait.
   void run();
 
   CommandQueue& commands() { return commands_; }
-  World& world() { return world_; }
+  core::World& world() { return world_; }
 
   /// Simulated time, ns.
   std::int64_t now() const { return now_; }
@@ -98,11 +98,11 @@ class Simulator {
   double energy() const { return world_.kineticEnergy() + world_.potentialEnergy(); }
 
   const Parameters parameters_;
-  World& world_;
+  core::World& world_;
   Outputs& outputs_;
   const std::function<bool()> stop_;
   CommandQueue commands_;
-  CollisionLog collisions_;
+  core::CollisionLog collisions_;
   bool listening_ = false;  // whether the world reports into collisions_
 
   // Simulated time.

@@ -16,7 +16,7 @@
 #include "run_options.hpp"
 #include "run_statistics.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace {
 
 constexpr int kDone = 0;
@@ -214,6 +214,6 @@ int runProgram(int argc, const char* const* argv) {
 }
 
 }  // namespace
-}  // namespace ball_sim
+}  // namespace ball_sim::core
 
-int main(int argc, char** argv) { return ball_sim::runProgram(argc, argv); }
+int main(int argc, char** argv) { return ball_sim::core::runProgram(argc, argv); }

@@ -5,7 +5,7 @@
 #include <cinttypes>
 #include <cstring>
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 OutputFile::OutputFile(const std::string& path)
     : path_(path), file_(std::fopen(path.c_str(), "w")) {
@@ -50,4 +50,4 @@ void EventsFile::take(CollisionLog& log) {
   file_.flush();
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

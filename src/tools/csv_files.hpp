@@ -9,7 +9,7 @@
 #include "ball_sim/ball.hpp"
 #include "ball_sim/method.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// A file that could not be opened or written; what() names it and the reason.
 class OutputError : public std::runtime_error {
@@ -59,4 +59,4 @@ class EventsFile {
   OutputFile file_;
 };
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <string>
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace {
 
 constexpr std::size_t kWidth = 40;  // characters
@@ -47,4 +47,4 @@ void ProgressBar::draw(double time) {
                bar.c_str(), 100 * share, time, until_, seconds, terminal_ ? "\033[K" : "\n");
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -3,7 +3,7 @@
 
 #include <chrono>
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// Writes to stderr: on a terminal one line that is drawn again and again, elsewhere a line every
 /// few seconds.
@@ -31,4 +31,4 @@ class ProgressBar {
   Clock::time_point last_;
 };
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -11,7 +11,7 @@
 #include "ball_sim/limits.hpp"
 #include "ball_sim/text.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace {
 
 // More states than that would fill any disk: the step is a slip.
@@ -208,4 +208,4 @@ std::string helpText() {
          "stderr, and the files hold what was reached.\n";
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

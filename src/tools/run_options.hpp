@@ -7,7 +7,7 @@
 
 #include "ball_sim/methods.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// An argument that was refused; what() reads "ARGUMENT: VALUE: RULE".
 class ArgumentError : public std::runtime_error {
@@ -37,4 +37,4 @@ std::string helpText();
 /// @throws ArgumentError  unknown, incomplete, repeated or out of range
 RunOptions parseArguments(int argc, const char* const* argv);
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

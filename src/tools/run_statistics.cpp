@@ -9,7 +9,7 @@
 
 #include "ball_sim/observables.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace {
 
 std::string json(double value) {
@@ -104,4 +104,4 @@ std::string statisticsJson(const World& world, const RunRecord& record) {
   return text.str();
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -6,7 +6,7 @@
 
 #include "ball_sim/world.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// What is conserved, or should be, at one instant.
 struct Conserved {
@@ -39,4 +39,4 @@ std::optional<double> compressibility(const World& world, const Conserved& befor
 /// All of it, as JSON.
 std::string statisticsJson(const World& world, const RunRecord& record);
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

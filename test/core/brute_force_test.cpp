@@ -12,7 +12,7 @@
 #include "support/replay.hpp"
 #include "support/trial.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace test {
 namespace {
 
@@ -73,4 +73,4 @@ INSTANTIATE_TEST_SUITE_P(ExactMethods, RandomScenes,
 
 }  // namespace
 }  // namespace test
-}  // namespace ball_sim
+}  // namespace ball_sim::core

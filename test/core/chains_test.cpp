@@ -6,7 +6,7 @@
 #include "support/methods_under_test.hpp"
 #include "support/trial.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace test {
 namespace {
 
@@ -131,4 +131,4 @@ INSTANTIATE_TEST_SUITE_P(ExactMethods, Chains, testing::ValuesIn(exactMethods())
 
 }  // namespace
 }  // namespace test
-}  // namespace ball_sim
+}  // namespace ball_sim::core

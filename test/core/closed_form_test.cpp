@@ -9,7 +9,7 @@
 #include "support/random_numbers.hpp"
 #include "support/trial.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace test {
 namespace {
 
@@ -160,4 +160,4 @@ INSTANTIATE_TEST_SUITE_P(ExactMethods, ClosedForm, testing::ValuesIn(exactMethod
 
 }  // namespace
 }  // namespace test
-}  // namespace ball_sim
+}  // namespace ball_sim::core

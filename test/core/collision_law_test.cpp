@@ -8,7 +8,7 @@
 
 #include "support/random_numbers.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace test {
 namespace {
 
@@ -137,4 +137,4 @@ TEST(CollisionLaw, partsPartnersWhoseApproachIsOnlyRounding) {
 
 }  // namespace
 }  // namespace test
-}  // namespace ball_sim
+}  // namespace ball_sim::core

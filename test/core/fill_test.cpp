@@ -10,7 +10,7 @@
 
 #include "ball_sim/observables.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
@@ -255,4 +255,4 @@ TEST(Fill, RefusesWhatCannotBePacked) {
 }
 
 }  // namespace
-}  // namespace ball_sim
+}  // namespace ball_sim::core

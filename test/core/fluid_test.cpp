@@ -10,7 +10,7 @@
 #include "support/random_numbers.hpp"
 #include "support/trial.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace test {
 namespace {
 
@@ -169,4 +169,4 @@ INSTANTIATE_TEST_SUITE_P(ExactMethods, SmallFluid, testing::ValuesIn(exactMethod
 
 }  // namespace
 }  // namespace test
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -9,7 +9,7 @@
 #include "support/methods_under_test.hpp"
 #include "support/trial.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace test {
 namespace {
 
@@ -100,4 +100,4 @@ INSTANTIATE_TEST_SUITE_P(ExactMethods, GalperinPrecision, testing::ValuesIn(exac
 
 }  // namespace
 }  // namespace test
-}  // namespace ball_sim
+}  // namespace ball_sim::core

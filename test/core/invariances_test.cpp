@@ -11,7 +11,7 @@
 #include "support/random_scenes.hpp"
 #include "support/trial.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace test {
 namespace {
 
@@ -256,4 +256,4 @@ INSTANTIATE_TEST_SUITE_P(ExactMethods, Invariance, testing::ValuesIn(exactMethod
 
 }  // namespace
 }  // namespace test
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -5,7 +5,7 @@
 #include "support/random_scenes.hpp"
 #include "support/trial.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace test {
 namespace {
 
@@ -149,4 +149,4 @@ INSTANTIATE_TEST_SUITE_P(ExactMethods, LiveChanges, testing::ValuesIn(exactMetho
 
 }  // namespace
 }  // namespace test
-}  // namespace ball_sim
+}  // namespace ball_sim::core

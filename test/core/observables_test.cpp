@@ -5,7 +5,7 @@
 
 #include <limits>
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
@@ -62,4 +62,4 @@ TEST(Observables, HashIsFnv1a) {
 }
 
 }  // namespace
-}  // namespace ball_sim
+}  // namespace ball_sim::core

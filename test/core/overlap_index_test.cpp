@@ -9,7 +9,7 @@
 
 #include "support/random_numbers.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace {
 
 struct Sphere {
@@ -74,4 +74,4 @@ TEST(OverlapIndex, SurvivesTheFarthestAndSmallest) {
 }
 
 }  // namespace
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -8,7 +8,7 @@
 #include <limits>
 #include <string>
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
@@ -275,4 +275,4 @@ TEST(SceneReader, SurvivesGarbage) {
 }
 
 }  // namespace
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -11,7 +11,7 @@
 #include "ball_sim/scene_reader.hpp"
 #include "ball_sim/world.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace {
 
 std::string sceneFile(const std::string& name) {
@@ -115,4 +115,4 @@ TEST(ShippedScenes, MixedSizesAreMixed) {
 }
 
 }  // namespace
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -11,7 +11,7 @@
 #include "support/random_scenes.hpp"
 #include "support/trial.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace test {
 namespace {
 
@@ -248,4 +248,4 @@ INSTANTIATE_TEST_SUITE_P(ExactMethods, Stability, testing::ValuesIn(exactMethods
 
 }  // namespace
 }  // namespace test
-}  // namespace ball_sim
+}  // namespace ball_sim::core

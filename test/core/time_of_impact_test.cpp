@@ -7,7 +7,7 @@
 
 #include "support/random_numbers.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace test {
 namespace {
 
@@ -154,4 +154,4 @@ TEST(TimeOfImpactAccelerated, overlappingMeetNowIffTheyApproach) {
 
 }  // namespace
 }  // namespace test
-}  // namespace ball_sim
+}  // namespace ball_sim::core

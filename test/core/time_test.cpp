@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace test {
 namespace {
 
@@ -55,4 +55,4 @@ TEST(Time, sumsOfManyStepsDoNotDrift) {
 
 }  // namespace
 }  // namespace test
-}  // namespace ball_sim
+}  // namespace ball_sim::core

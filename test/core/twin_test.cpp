@@ -20,7 +20,7 @@
 #include "support/random_scenes.hpp"
 #include "support/trial.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace test {
 namespace {
 
@@ -419,4 +419,4 @@ INSTANTIATE_TEST_SUITE_P(FastMethods, TouchingTwin, testing::ValuesIn(candidates
 
 }  // namespace
 }  // namespace test
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -9,7 +9,7 @@
 #include "support/random_numbers.hpp"
 #include "support/trial.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace test {
 namespace {
 
@@ -213,4 +213,4 @@ INSTANTIATE_TEST_SUITE_P(ExactMethods, RestingBalls, testing::ValuesIn(exactMeth
 
 }  // namespace
 }  // namespace test
-}  // namespace ball_sim
+}  // namespace ball_sim::core

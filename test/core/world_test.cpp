@@ -10,7 +10,7 @@
 
 #include "ball_sim/observables.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
@@ -312,4 +312,4 @@ TEST(World, RefusesUnknownMethodsAndTimeSteps) {
 }
 
 }  // namespace
-}  // namespace ball_sim
+}  // namespace ball_sim::core

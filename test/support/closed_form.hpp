@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace test {
 
 using LongDouble = long double;
@@ -140,4 +140,4 @@ class GalperinBilliard {
 };
 
 }  // namespace test
-}  // namespace ball_sim
+}  // namespace ball_sim::core

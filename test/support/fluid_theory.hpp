@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace test {
 
 /// Z of hard spheres, good to about 0.3 % in the fluid.
@@ -29,4 +29,4 @@ inline double compressibilityFromRate(double rate, double sigma, double thermal_
 }
 
 }  // namespace test
-}  // namespace ball_sim
+}  // namespace ball_sim::core

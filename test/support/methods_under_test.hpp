@@ -10,7 +10,7 @@
 
 #include "ball_sim/methods.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace test {
 
 /// The slow twin: right by its plainness, and the reference of the others.
@@ -39,4 +39,4 @@ inline std::string methodOf(const testing::TestParamInfo<std::string>& instance)
 }
 
 }  // namespace test
-}  // namespace ball_sim
+}  // namespace ball_sim::core

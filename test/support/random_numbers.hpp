@@ -7,7 +7,7 @@
 
 #include "ball_sim/vector.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace test {
 
 /// The standard fixes the bits of the engine but not those of its distributions, so these are ours.
@@ -52,4 +52,4 @@ class RandomNumbers {
 };
 
 }  // namespace test
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -10,7 +10,7 @@
 #include "random_numbers.hpp"
 #include "trial.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace test {
 
 enum class Boundary { open, closed, half_open, periodic, planes };
@@ -232,4 +232,4 @@ inline std::vector<SceneKind> sceneKinds() {
 }
 
 }  // namespace test
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -15,7 +15,7 @@
 
 #include "trial.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace test {
 
 /// The largest deviations seen; all of them rounding in a correct run.
@@ -227,4 +227,4 @@ class Replay {
 };
 
 }  // namespace test
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -11,7 +11,7 @@
 
 #include "ball_sim/methods.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 namespace test {
 
 /// The mass of a fixed ball, kg.
@@ -106,4 +106,4 @@ inline VectorOf<long double> momentumOf(const TestScene& scene, const BallStates
 }
 
 }  // namespace test
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -24,7 +24,7 @@
 #include "event_driven/event_queue.hpp"
 #include "event_driven/huge_page_vector.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// Coordinates of a cell along the axes, in the cells of one level.
 using CellCoordinates = std::array<std::int32_t, 3>;
@@ -529,4 +529,4 @@ class CellGrid {
   std::vector<std::array<Real, 3>> edges_;  // m, by level and axis
 };
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -2,7 +2,7 @@
 
 #include "event_driven/make_event_driven.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 std::unique_ptr<Method> makeEventDriven(const Surroundings& surroundings, Precision precision) {
   const bool falls = surroundings.gravity != Vector3::Zero();
@@ -14,4 +14,4 @@ std::unique_ptr<Method> makeEventDriven(const Surroundings& surroundings, Precis
   return std::make_unique<EventDriven<double, false>>(surroundings);
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -34,7 +34,7 @@
 #include "event_driven/huge_page_vector.hpp"
 #include "event_driven/pair_batch.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// @tparam Real      double or long double
 /// @tparam kGravity  whether balls fall; without it no acceleration is stored or computed
@@ -926,4 +926,4 @@ class EventDriven final : public Method {
   CollisionLog* log_ = nullptr;
 };
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

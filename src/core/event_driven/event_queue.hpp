@@ -20,7 +20,7 @@
 
 #include "event_driven/huge_page_vector.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// Index of a ball in a method's arrays.
 using Slot = std::uint32_t;
@@ -245,4 +245,4 @@ class EventQueue {
   std::size_t in_year_ = 0;      // events in buckets and heap
 };
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

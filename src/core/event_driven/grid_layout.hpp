@@ -8,7 +8,7 @@
 #include "ball_sim/surroundings.hpp"
 #include "event_driven/cell_grid.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// Cells are wider than the balls by this, more than rounding ever moves a ball out of its cell.
 constexpr double kCellMargin = 1 + 1e-9;
@@ -139,4 +139,4 @@ CellGrid<Real> layOutGrid(const Surroundings& surroundings,
   return CellGrid<Real>(axes, depths);
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

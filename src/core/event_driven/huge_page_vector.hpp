@@ -11,7 +11,7 @@
 #include <sys/mman.h>
 #endif
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 template <class T>
 struct HugePageAllocator {
@@ -43,4 +43,4 @@ struct HugePageAllocator {
 template <class T>
 using HugePageVector = std::vector<T, HugePageAllocator<T>>;
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -5,9 +5,9 @@
 
 #include "ball_sim/methods.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 /// @param surroundings  checked; without gravity nothing of gravity is computed
 std::unique_ptr<Method> makeEventDriven(const Surroundings& surroundings, Precision precision);
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

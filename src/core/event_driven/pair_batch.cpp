@@ -7,7 +7,7 @@
 #define BALL_SIM_WIDEST
 #endif
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 BALL_SIM_WIDEST void findImpacts(PairBatch<double>& batch, const double* x, const double* v,
                                  double radius, double now) {
@@ -19,4 +19,4 @@ void findImpacts(PairBatch<long double>& batch, const long double* x, const long
   findImpactsInline(batch, x, v, radius, now);
 }
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -17,7 +17,7 @@
 #include "ball_sim/time_of_impact.hpp"
 #include "ball_sim/vector.hpp"
 
-namespace ball_sim {
+namespace ball_sim::core {
 
 template <class Real>
 struct PairBatch {
@@ -133,4 +133,4 @@ void findImpacts(PairBatch<double>& batch, const double* x, const double* v, dou
 void findImpacts(PairBatch<long double>& batch, const long double* x, const long double* v,
                  long double radius, long double now);
 
-}  // namespace ball_sim
+}  // namespace ball_sim::core

@@ -17,24 +17,24 @@
 namespace ball_sim {
 namespace {
 
-World makeWorld(const Parameters& parameters) {
-  Scene scene = readScene(findScene(parameters.scene));
+core::World makeWorld(const Parameters& parameters) {
+  core::Scene scene = core::readScene(findScene(parameters.scene));
   if (parameters.seed) {
     auto seed = static_cast<std::uint64_t>(*parameters.seed);
-    for (Fill& fill : scene.fill) {
+    for (core::Fill& fill : scene.fill) {
       fill.seed = seed++;
     }
   }
-  WorldOptions options;
+  core::WorldOptions options;
   options.method = parameters.method;
   options.time_step = parameters.time_step;
   options.max_balls = static_cast<std::size_t>(parameters.max_balls);
-  return World(scene, options);
+  return core::World(scene, options);
 }
 
 void run(ros::NodeHandle& node) {
   const Parameters parameters = readParameters(node);
-  World world = makeWorld(parameters);
+  core::World world = makeWorld(parameters);
   ROS_INFO_STREAM("scene " << world.scene().name << ": " << world.size() << " balls, method "
                            << world.method().name << " (" << world.method().reason << ")");
   Outputs outputs(node, parameters);

@@ -10,8 +10,9 @@
 #include <vector>
 
 #include "ball_markers.hpp"
+#include "ball_sim/BallProperties.h"
+#include "ball_sim/BallStates.h"
 #include "conversions.hpp"
-#include "messages.hpp"
 
 namespace ball_sim {
 namespace {
@@ -37,7 +38,7 @@ class Replay {
     ball_markers_.setBalls({}, {});
   }
 
-  void onStates(const BallStatesMessage& states) {
+  void onStates(const BallStates& states) {
     const bool whole = states.positions.size() == states.ids.size() &&
                        states.velocities.size() == states.ids.size();
     if (!whole || markers_.getNumSubscribers() == 0) {
@@ -48,7 +49,7 @@ class Replay {
   }
 
   /// Keeps the balls whose properties are known: around a change the two topics may differ.
-  void drawKnown(const BallStatesMessage& states) {
+  void drawKnown(const BallStates& states) {
     fillStates(states, known_);
     std::vector<double> radii;
     std::vector<std_msgs::ColorRGBA> colors;
@@ -78,8 +79,8 @@ class Replay {
   }
 
   BallProperties properties_;  // the last that came
-  BallStates known_;
-  std::vector<BallId> drawn_ids_;  // what ball_markers_ is set to
+  core::BallStates known_;
+  std::vector<core::BallId> drawn_ids_;  // what ball_markers_ is set to
   BallMarkers ball_markers_;
   ros::Publisher markers_;
   ros::Subscriber properties_subscriber_;

@@ -55,7 +55,7 @@ std::optional<Bounds> awaitBounds() {
 /// Points the current view of an RViz configuration at the bounds.
 void aim(YAML::Node config, const Bounds& bounds) {
   YAML::Node view = config["Visualization Manager"]["Views"]["Current"];
-  const Vector3 size = bounds.max() - bounds.min();
+  const core::Vector3 size = bounds.max() - bounds.min();
   const bool flat = size.z() < 0.3 * std::max(size.x(), size.y());
   const double pitch = flat ? view["Pitch"].as<double>() : kLowPitch;
   const Camera camera = cameraFor(bounds, view["Yaw"].as<double>(), pitch,
