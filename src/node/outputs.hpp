@@ -49,6 +49,9 @@ class Outputs {
 
   void publishStats(const SimStats& stats) { stats_.publish(stats); }
 
+  /// Full name of ~markers.
+  std::string markersTopic() const { return markers_.getTopic(); }
+
   bool wantsCollisions() const { return collisions_.getNumSubscribers() > 0; }
 
   /// ~collisions, unless nothing has happened. Empties the log.

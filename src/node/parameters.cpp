@@ -177,6 +177,7 @@ Parameters readParameters(const ros::NodeHandle& private_node) {
   p.marker_rate = reader.numberOrZero("marker_rate", 0.1, 60).value_or(p.marker_rate);
   p.publish_clock = reader.truth("publish_clock").value_or(p.publish_clock);
   p.start_paused = reader.truth("start_paused").value_or(p.start_paused);
+  p.wait_for_viewer = reader.numberOrZero("wait_for_viewer", 0.1, 600).value_or(p.wait_for_viewer);
   p.start_time = reader.number("start_time", 1e-9, 4e9).value_or(p.start_time);
   p.max_balls = reader.integer("max_balls", 1, 10000000).value_or(p.max_balls);
   p.max_events_per_frame =

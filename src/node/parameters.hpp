@@ -32,6 +32,9 @@ struct Parameters {
   double marker_rate = 25;           ///< Hz of wall time, 0.1..60; 0: no ~markers
   bool publish_clock = true;         ///< false: another node owns /clock
   bool start_paused = false;
+  double wait_for_viewer = 0;       ///< s of wall time, 0.1..600: start paused, and resume when
+                                    ///< RViz shows ~markers, or after so long; 0, or start_paused:
+                                    ///< no wait. ~pause, ~resume, ~toggle_pause and ~step end it
   double start_time = 1;            ///< s, 1e-9..4e9: ROS time of simulated time 0
   int max_balls = 1000000;          ///< 1..10000000
   int max_events_per_frame = 1000;  ///< 1..1e9: after so many events without a pause the node looks

@@ -51,6 +51,10 @@ Simulator::Simulator(const Parameters& parameters, core::World& world, Outputs& 
       clock_due_(parameters.clock_rate),
       markers_due_(parameters.marker_rate) {
   collisions_.capacity = Outputs::kMaxCollisions;
+  if (parameters.wait_for_viewer > 0 && !paused_) {
+    viewer_wait_.emplace(outputs.markersTopic(), parameters.wait_for_viewer);
+    paused_ = true;
+  }
 }
 
 void Simulator::run() {
@@ -60,6 +64,7 @@ void Simulator::run() {
   publishStates();
   while (!stop_()) {
     serveCommands();
+    awaitViewer();
     const bool frame_ended = paused_ || advance(frames_.after(now_));
     publishFrame(frame_ended);
     if (frame_ended) {
@@ -71,12 +76,18 @@ void Simulator::run() {
 
 ros::Time Simulator::stamp() const { return toStamp(start_ + now_); }
 
+void Simulator::setPaused(bool paused) {
+  viewer_wait_.reset();
+  paused_ = paused;
+}
+
 void Simulator::noteChange(bool population) {
   changed_ = true;
   population_ = population_ || population;
 }
 
 bool Simulator::step(std::int64_t target, Clock::time_point deadline) {
+  viewer_wait_.reset();
   while (now_ < target) {
     if (stop_() || Clock::now() > deadline) {
       break;
@@ -144,6 +155,17 @@ bool Simulator::settled() const { return world_.now() == core::Time::fromNanosec
 void Simulator::serveCommands() {
   if (settled() && commands_.runDue(now_)) {
     finishCommands();
+  }
+}
+
+/// Starts when the viewer is there.
+void Simulator::awaitViewer() {
+  if (!viewer_wait_) {
+    return;
+  }
+  moved_ = true;  // so that it gets markers as soon as it listens
+  if (viewer_wait_->over(Clock::now())) {
+    setPaused(false);
   }
 }
 

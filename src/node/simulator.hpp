@@ -11,6 +11,7 @@
 #include "grid.hpp"
 #include "outputs.hpp"
 #include "parameters.hpp"
+#include "viewer_wait.hpp"
 
 namespace ball_sim {
 
@@ -68,13 +69,15 @@ class Simulator {
   ros::Time stamp() const;
 
   bool paused() const { return paused_; }
-  void setPaused(bool paused) { paused_ = paused; }
+
+  /// Ends the wait for a viewer too: who asks knows better when to start.
+  void setPaused(bool paused);
 
   /// Must follow every change to the world's balls from outside.
   /// @param population  whether balls came or went
   void noteChange(bool population);
 
-  /// Runs on as fast as it can.
+  /// Runs on as fast as it can. The wait for a viewer ends: what follows is pause.
   /// @param target  simulated time, ns. @return false: stopped early, at now()
   bool step(std::int64_t target, Clock::time_point deadline);
 
@@ -89,6 +92,7 @@ class Simulator {
   bool moveTo(std::int64_t target);
   bool settled() const;
   void serveCommands();
+  void awaitViewer();
   void finishCommands();
   void waitForNextFrame();
   void publishFrame(bool frame_ended);
@@ -106,11 +110,12 @@ class Simulator {
   bool listening_ = false;  // whether the world reports into collisions_
 
   // Simulated time.
-  const std::int64_t start_;  // ns
-  std::int64_t now_ = 0;      // ns
-  const Grid frames_;         // frames end here
-  const Grid states_;         // ~ball_states, and whole steps
-  bool paused_;
+  const std::int64_t start_;               // ns
+  std::int64_t now_ = 0;                   // ns
+  const Grid frames_;                      // frames end here
+  const Grid states_;                      // ~ball_states, and whole steps
+  bool paused_;                            // also while waiting for a viewer
+  std::optional<ViewerWait> viewer_wait_;  // begun, and not over
 
   // Wall time.
   Clock::time_point next_frame_;

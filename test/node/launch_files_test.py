@@ -61,6 +61,9 @@ class LaunchFilesTest(unittest.TestCase):
     def test_arguments_say_what_starts(self):
         self.assertIn('rviz', load('simulation.launch')[0])
         self.assertNotIn('rviz', load('simulation.launch', 'rviz:=false')[0])
+        self.assertIn('/ball_sim/wait_for_viewer', load('simulation.launch')[1].params)
+        self.assertNotIn('/ball_sim/wait_for_viewer',
+                         load('simulation.launch', 'rviz:=false')[1].params)
         self.assertNotIn('ball_sim_record', load('simulation.launch')[0])
         recorder = load('simulation.launch', 'record:=true', 'bag_prefix:=here')[0]['ball_sim_record']
         for word in ('--split', '--lz4', 'here', 'ball_states', 'ball_properties', 'collisions',

@@ -38,6 +38,7 @@ class LifecycleTest(unittest.TestCase):
                  ('state_rate', '-1', '0 or 0.001 to 1000'), ('state_rate', '1001', '1000'),
                  ('marker_rate', '61', '0 or 0.1 to 60'),
                  ('real_time_factor', '-1', '0 or 0.001 to 1000'),
+                 ('wait_for_viewer', '601', '0 or 0.1 to 600'),
                  ('start_time', '0', '1e-09 to 4000000000'),
                  ('time_step', '0', '1e-09 to 1'), ('seed', '-2', '-1 to 2147483647'),
                  ('seed', '1.5', 'whole number'), ('max_balls', '0', '1 to 10000000'),
