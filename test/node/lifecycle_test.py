@@ -12,7 +12,7 @@ from std_srvs.srv import Trigger
 from ball_sim.msg import BallProperties, BallStates, Code, SimStats
 from ball_sim.srv import ApplyImpulse, Step
 from geometry_msgs.msg import Vector3
-from support import Listener, call, scene, start_node, wait_until
+from support import Listener, Process, call, scene, start_node, wait_until
 
 
 class LifecycleTest(unittest.TestCase):
@@ -55,6 +55,14 @@ class LifecycleTest(unittest.TestCase):
             for word in (name, value.strip('.'), rule):
                 self.assertIn(word, node.output())
 
+    def test_roslaunch_shows_why_the_node_ended(self):
+        process = Process(['roslaunch', 'ball_sim', 'simulation.launch', 'rviz:=false',
+                           'scene:=atlantis'])
+        self.nodes.append(process)
+        process.wait()
+        for word in ('FATAL', 'atlantis', 'break_shot', 'two_balls'):
+            self.assertIn(word, process.output())
+
     def test_bad_scene_is_fatal(self):
         node = self.start('bad_scene', scene=scene('broken'))
         self.assertEqual(node.wait(), 1)
@@ -79,8 +87,8 @@ class LifecycleTest(unittest.TestCase):
             states = Listener(name + '/ball_states', BallStates)
             self.start(name, scene=scene('gas'), seed=seed, start_paused=True)
             states.wait_for_publisher()
-            call(name + '/step', Step, steps=1)
-            first.append(states.wait_count(1)[0].positions)
+            reached = call(name + '/step', Step, steps=1).stamp
+            first.append(states.wait(lambda m, t=reached: m.header.stamp == t).positions)
         self.assertEqual(first[0], first[1])
         self.assertNotEqual(first[0], first[2])
 
@@ -88,8 +96,11 @@ class LifecycleTest(unittest.TestCase):
         states = Listener('rates/ball_states', BallStates)
         self.start('rates', start_time=1000, state_rate=60, start_paused=True, publish_clock=False)
         states.wait_for_publisher()
-        call('rates/step', Step, steps=60)
-        stamps = [m.header.stamp.to_nsec() for m in states.wait_count(60)]
+        reached = call('rates/step', Step, steps=60).stamp
+        states.wait(lambda m: m.header.stamp == reached, 'states at the end of the step')
+        stamps = [m.header.stamp.to_nsec() for m in states.messages()]
+        if stamps[0] == 1000 * 10**9:  # the start itself, for who was there in time
+            stamps.pop(0)
         self.assertEqual(stamps, [1000 * 10**9 + (k * 10**9 + 30) // 60 for k in range(1, 61)])
 
     def test_publish_clock_off(self):

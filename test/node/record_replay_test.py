@@ -10,13 +10,13 @@ import unittest
 import rosbag
 import rospy
 import rostest
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ball_sim.msg import BallStates
 from ball_sim.srv import SpawnBall
 from geometry_msgs.msg import Point
-from support import PATIENCE, Listener, Process, call, wait_until
+from support import PATIENCE, Listener, Process, call, count_links, wait_until
 
 
 class RecordReplayTest(unittest.TestCase):
@@ -51,8 +51,8 @@ class RecordReplayTest(unittest.TestCase):
 
     @staticmethod
     def recorder_listens():
-        subscribers = rospy.get_master().getSystemState()[2][1]
-        return sum('/ball_sim_record' in nodes for _, nodes in subscribers) >= 5
+        return all(count_links('/ball_sim/' + topic, '/ball_sim_record') for topic in (
+            'ball_states', 'ball_properties', 'collisions', 'stats', 'scene_markers'))
 
     def check(self, bag_path):
         """What the bag holds. Returns the recorded states."""
@@ -80,7 +80,9 @@ class RecordReplayTest(unittest.TestCase):
         table = Listener('/ball_sim/scene_markers', MarkerArray)
         relative = os.path.relpath(bag_path)
         self.process = Process(['roslaunch', 'ball_sim', 'replay.launch', 'rviz:=false',
-                                'bag:=' + relative])
+                                'paused:=true', 'bag:=' + relative])
+        wait_until(self.all_listen, 'the player and its listeners')
+        call('/player/pause_playback', SetBool, data=False)
         last = recorded[-1]
         message = listener.wait(lambda m: m.markers and
                                 m.markers[0].header.stamp == last.header.stamp, 'the last markers')
@@ -94,6 +96,13 @@ class RecordReplayTest(unittest.TestCase):
         self.assertNotIn('/ball_sim', [n for _, providers in nodes for n in providers])
         self.process.signal(signal.SIGINT)
         self.process.wait(PATIENCE)
+
+    @staticmethod
+    def all_listen():
+        return (all(count_links('/ball_sim/' + topic, '/ball_sim_replay') for topic in
+                    ('ball_states', 'ball_properties')) and
+                all(count_links('/ball_sim/' + topic, rospy.get_name()) for topic in
+                    ('markers', 'scene_markers')))
 
     def test_record_and_replay(self):
         bag = self.record()

@@ -2,6 +2,7 @@
 import subprocess
 import threading
 import time
+import xmlrpc.client
 
 import roslib.packages
 import rospy
@@ -24,8 +25,9 @@ class Listener:
             self._changed.notify_all()
 
     def wait_for_publisher(self, count=1):
-        """Waits until `count` publishers are connected."""
-        wait_until(lambda: self._subscriber.get_num_connections() >= count, 'a publisher')
+        """Waits until `count` publishers send to it; what they publish from then on, comes."""
+        topic = self._subscriber.resolved_name
+        wait_until(lambda: count_links(topic, rospy.get_name()) >= count, 'a publisher')
 
     def clear(self):
         with self._changed:
@@ -62,6 +64,26 @@ def wait_until(condition, what, patience=PATIENCE):
         if time.monotonic() > deadline:
             raise AssertionError('never came: ' + what)
         time.sleep(0.02)
+
+
+def count_links(topic, subscriber):
+    """How many publishers of a topic send to a node.
+
+    They are asked themselves: a subscriber believes in a connection a little too soon.
+    """
+    master = rospy.get_master()
+    publishers = dict(master.getSystemState()[2][0]).get(topic, [])
+    count = 0
+    for name in publishers:
+        try:
+            node = xmlrpc.client.ServerProxy(master.lookupNode(name)[2])
+            links = node.getBusInfo(rospy.get_name())[2]
+        except (OSError, rospy.MasterException, TypeError):  # not there, or not any more
+            continue
+        # Of a link: number, who is at the other end, direction (o: out), transport, topic.
+        count += any(link[1] == subscriber and link[2] == 'o' and link[4] == topic
+                     for link in links)
+    return count
 
 
 def call(name, service_type, **fields):

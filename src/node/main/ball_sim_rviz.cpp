@@ -1,8 +1,8 @@
 // ball_sim_rviz: RViz with a given configuration, its camera moved to where the balls are.
 //
 // Scenes differ in size by far more than one view can serve, and RViz takes a view only from its
-// configuration. So this waits for the first markers, writes the configuration anew into a
-// temporary file, and becomes RViz.
+// configuration. So this waits for the first markers, writes the configuration anew into the user's
+// folder for ROS, and becomes RViz.
 #include <ros/callback_queue.h>
 #include <ros/console.h>
 #include <ros/init.h>
@@ -14,8 +14,10 @@
 #include <chrono>
 #include <cstdlib>
 #include <exception>
+#include <filesystem>
 #include <fstream>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -68,16 +70,29 @@ void aim(YAML::Node config, const Bounds& bounds) {
   view["Focal Point"]["Z"] = camera.focus.z();
 }
 
-/// @return path of a new file
-std::string writeTemporary(const YAML::Node& config) {
-  std::string path = "/tmp/ball_sim_XXXXXX.rviz";
-  const int file = mkstemps(path.data(), 5);
-  if (file < 0) {
-    throw std::runtime_error("cannot write " + path);
+/// Where ROS keeps what is the user's: ROS_HOME, or ~/.ros.
+std::filesystem::path rosHome() {
+  if (const char* home = std::getenv("ROS_HOME")) {
+    return home;
   }
-  close(file);
-  std::ofstream(path) << config << '\n';
-  return path;
+  if (const char* home = std::getenv("HOME")) {
+    return std::filesystem::path(home) / ".ros";
+  }
+  throw std::runtime_error("neither ROS_HOME nor HOME is set");
+}
+
+/// Writes over what was written before, so that no files pile up.
+/// @return path of the file
+std::string write(const YAML::Node& config) {
+  const std::filesystem::path path = rosHome() / "ball_sim.rviz";
+  std::filesystem::create_directories(path.parent_path());
+  std::ofstream file(path);
+  file << config << '\n';
+  file.close();
+  if (!file) {
+    throw std::runtime_error("cannot write " + path.string());
+  }
+  return path.string();
 }
 
 /// @return path of the configuration to use
@@ -88,7 +103,7 @@ std::string prepare(const std::string& path) {
   }
   const YAML::Node config = YAML::LoadFile(path);
   aim(config, *bounds);
-  return writeTemporary(config);
+  return write(config);
 }
 
 }  // namespace
