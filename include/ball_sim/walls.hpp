@@ -150,7 +150,7 @@ VectorOf<Real> settleContacts(RestingContacts& contacts, VectorOf<Real>& v, Real
   for (int i = contacts.count - 1; i >= 0; --i) {
     if (!comesToRest<Real>(dot(v, normal(i)), -weight, radius)) contacts.removeAt(i);
   }
-  const VectorOf<Real> a = constrainedAcceleration<Real>(gravity, walls, contacts);
+  VectorOf<Real> a = constrainedAcceleration<Real>(gravity, walls, contacts);
   for (int i = contacts.count - 1; i >= 0; --i) {
     if (dot(a, normal(i)) > Real(1e-12) * weight) contacts.removeAt(i);
   }

@@ -59,8 +59,8 @@ std::string joined(const std::vector<std::string>& names) {
 
 }  // namespace
 
-YamlField::YamlField(std::string source, std::string key, YAML::Node node)
-    : source_(std::move(source)), key_(std::move(key)), node_(std::move(node)) {}
+YamlField::YamlField(std::string source, std::string key, const YAML::Node& node)
+    : source_(std::move(source)), key_(std::move(key)), node_(node) {}
 
 void YamlField::fail(const std::string& rule) const {
   throw SceneError(place(source_, node_) + (key_.empty() ? "scene" : key_) + ": " + shown(node_) +

@@ -18,7 +18,7 @@ class YamlField {
  public:
   /// @param source  what errors call the file
   /// @param key     full key, such as balls[3].radius; empty for the whole file
-  YamlField(std::string source, std::string key, YAML::Node node);
+  YamlField(std::string source, std::string key, const YAML::Node& node);
 
   /// Refuses this value. @param rule  what it must be
   [[noreturn]] void fail(const std::string& rule) const;

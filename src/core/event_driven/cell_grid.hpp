@@ -214,7 +214,7 @@ class CellLevel {
     const AxisNeighbours& x = neighbours(0, c[0]);
     const AxisNeighbours& y = neighbours(1, c[1]);
     const AxisNeighbours& z = neighbours(2, c[2]);
-    candidates.reserve(27 * 4);
+    candidates.reserve(kMostInPlace);
     const bool around = axis == kAllAround;
     if (x.inside && y.inside && z.inside) {
       const std::uint32_t middle = x.cell[1] + y.cell[1] + z.cell[1];
@@ -240,6 +240,9 @@ class CellLevel {
   }
 
   static constexpr std::size_t kAllAround = 3;  // no axis
+
+  // What 27 cells are copied to, their counts included.
+  static constexpr std::size_t kMostInPlace = 27 * sizeof(Cell) / sizeof(Slot);
 
   std::size_t bytes() const {
     std::size_t bytes =
@@ -336,7 +339,7 @@ class CellLevel {
 
   void gatherChain(const Cell& cell, Image image, Candidates& candidates) const {
     for (Slot s = next_[cell.slots[2]]; s != kNoSlot; s = next_[s]) candidates.add(s, image);
-    candidates.reserve(27 * 4);
+    candidates.reserve(kMostInPlace);
   }
 
   void dropLast(Cell& cell, std::uint32_t last) {

@@ -221,7 +221,7 @@ class EventDriven final : public Method {
     BallId id = 0;
     double mass = 0;  // kg
     CellCoordinates cell = {0, 0, 0};
-    std::int8_t crossing_axis = 0;
+    std::uint8_t crossing_axis = 0;
     std::int8_t crossing_direction = 0;  // -1 or +1
     std::uint8_t level = 0;              // index into the grid's levels
   };
@@ -357,7 +357,7 @@ class EventDriven final : public Method {
   // From a to the image of b that it meets: the nearest, but where the box is so small that several
   // are in reach, the one it approaches fastest.
   Vec contactVector(const Body& a, const Body& b, Real reach) const {
-    const Vec nearest = nearestImage(b.x - a.x);
+    Vec nearest = nearestImage(b.x - a.x);
     if (smallest_period_ > Real(2.1) * reach) return nearest;
     Vec best = nearest;
     Real fastest = -kNever<Real>;
@@ -838,7 +838,7 @@ class EventDriven final : public Method {
     std::size_t k = gap[1] * speed[0] < gap[0] * speed[1] ? 1 : 0;
     k = gap[2] * speed[k] < gap[k] * speed[2] ? 2 : k;
     agenda.crossing_time = now_ + gap[k] / speed[k];
-    agenda.crossing_axis = static_cast<std::int8_t>(k);
+    agenda.crossing_axis = static_cast<std::uint8_t>(k);
     agenda.crossing_direction = v[static_cast<int>(k)] < 0 ? -1 : 1;
   }
 
@@ -862,7 +862,7 @@ class EventDriven final : public Method {
     if (!(now_ + wait < agenda.crossing_time)) return;
     if (grid_.isWall(axis, agenda.level, agenda.cell[axis], direction)) return;
     agenda.crossing_time = now_ + wait;
-    agenda.crossing_axis = static_cast<std::int8_t>(axis);
+    agenda.crossing_axis = static_cast<std::uint8_t>(axis);
     agenda.crossing_direction = static_cast<std::int8_t>(direction);
   }
 
