@@ -188,7 +188,7 @@ bool placeOnLattice(std::vector<Ball>& balls, const Surroundings& surroundings,
   if (extent.minCoeff() < 0) return false;
   const Box room = centresWithin(surroundings, radius);
   const OverlapIndex others = indexOf(present, surroundings);
-  const auto isFree = [&](const Vector3& place) {
+  const auto is_free = [&](const Vector3& place) {
     return !checkPlace(place, radius, surroundings) && !others.overlapsAny(place, radius);
   };
   // Sites that planes or other balls take are made up for by a narrower lattice.
@@ -199,7 +199,7 @@ bool placeOnLattice(std::vector<Ball>& balls, const Surroundings& surroundings,
     if (lattice.spacing == 0) return false;
     std::vector<Vector3> sites = sitesOf(lattice, extent, room, surroundings);
     const auto taken = std::remove_if(sites.begin(), sites.end(),
-                                      [&](const Vector3& site) { return !isFree(site); });
+                                      [&](const Vector3& site) { return !is_free(site); });
     const auto lost = static_cast<double>(sites.end() - taken);
     sites.erase(taken, sites.end());
     if (sites.size() < balls.size()) {
@@ -212,7 +212,7 @@ bool placeOnLattice(std::vector<Ball>& balls, const Surroundings& surroundings,
       const Vector3 shifted = (sites[i] + randomShift(gap, surroundings.planar(), random))
                                   .cwiseMax(room.min)
                                   .cwiseMin(room.max);
-      balls[i].position = isFree(shifted) ? shifted : sites[i];
+      balls[i].position = is_free(shifted) ? shifted : sites[i];
     }
     return true;
   }
