@@ -71,7 +71,6 @@ void Simulator::run() {
       waitForNextFrame();
     }
   }
-  commands_.close();
 }
 
 ros::Time Simulator::stamp() const { return toStamp(start_ + now_); }

@@ -53,7 +53,7 @@ class Simulator {
   Simulator(const Parameters& parameters, core::World& world, Outputs& outputs,
             std::function<bool()> stop);
 
-  /// Runs until stopped, then takes back all commands that still wait.
+  /// Runs until stopped. Commands that still wait then are for the owner of commands() to close.
   void run();
 
   CommandQueue& commands() { return commands_; }
