@@ -1,5 +1,5 @@
 // The known name a mistyped one was probably meant to be.
-#include "nearest_name.hpp"
+#include "ball_sim/nearest_name.hpp"
 
 #include <algorithm>
 #include <numeric>

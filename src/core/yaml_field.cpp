@@ -7,9 +7,9 @@
 #include <set>
 #include <sstream>
 
+#include "ball_sim/nearest_name.hpp"
 #include "ball_sim/scene_reader.hpp"
 #include "ball_sim/text.hpp"
-#include "nearest_name.hpp"
 
 namespace ball_sim::core {
 namespace {

@@ -5,10 +5,10 @@
 
 #include <algorithm>
 #include <limits>
-#include <numeric>
 #include <sstream>
 #include <vector>
 
+#include "ball_sim/nearest_name.hpp"
 #include "ball_sim/text.hpp"
 
 namespace ball_sim {
@@ -94,8 +94,10 @@ class Reader {
       }
       const std::string name = full_name.substr(prefix.size());
       if (std::find(known_.begin(), known_.end(), name) == known_.end()) {
-        ROS_WARN_STREAM("unknown parameter ~" << name << " is ignored; did you mean ~"
-                                              << nearestName(name, known_) << "?");
+        const std::optional<std::string> near = core::nearestName(name, known_);
+        ROS_WARN_STREAM("unknown parameter ~"
+                        << name << " is ignored; "
+                        << (near ? "did you mean ~" + *near + "?" : "known are: " + join(known_)));
       }
     }
   }
@@ -132,29 +134,7 @@ class Reader {
   std::vector<std::string> known_;
 };
 
-std::size_t editDistance(const std::string& a, const std::string& b) {
-  // row[j]: edits from the letters of `a` so far to the first j letters of `b`.
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i + 1;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({replaced, row[j] + 1, row[j + 1] + 1});
-    }
-  }
-  return row.back();
-}
-
 }  // namespace
-
-const std::string& nearestName(const std::string& name, const std::vector<std::string>& known) {
-  return *std::min_element(known.begin(), known.end(), [&](const auto& a, const auto& b) {
-    return editDistance(name, a) < editDistance(name, b);
-  });
-}
 
 Parameters readParameters(const ros::NodeHandle& private_node) {
   Reader reader(private_node);

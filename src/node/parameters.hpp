@@ -44,12 +44,8 @@ struct Parameters {
 };
 
 /// Reads what is set, keeps the defaults of what is not, and warns of parameters it does not know,
-/// naming the nearest known one.
+/// naming the nearest known one, or all when none is near.
 /// @throws ParameterError  wrong type or out of range
 Parameters readParameters(const ros::NodeHandle& private_node);
-
-/// The name among `known` that takes the fewest edits to become `name` (Levenshtein distance).
-/// @param known  not empty
-const std::string& nearestName(const std::string& name, const std::vector<std::string>& known);
 
 }  // namespace ball_sim
