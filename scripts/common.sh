@@ -120,6 +120,8 @@ show_apt_progress() {
 # Ubuntu's ROS lives in /opt/ros and has to be asked for; Debian's is in /usr.
 use_ros() {
   local setup=/opt/ros/noetic/setup.bash
+  # ROS's Python modules belong to the system's Python, and its scripts take the first on PATH.
+  export PATH="/usr/bin:$PATH"
   if [ "$(package_column 2>/dev/null)" = 3 ]; then
     [ -r "$setup" ] || fail "$setup is not there, though ROS's packages are."
     source_setup "$setup"
