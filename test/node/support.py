@@ -1,4 +1,5 @@
 """What the node's tests share."""
+import os
 import subprocess
 import threading
 import time
@@ -101,8 +102,11 @@ class Process:
     """A program, its output, and its end."""
 
     def __init__(self, command):
+        # As a shell would: rostest moves its nodes to ROS_HOME and leaves PWD behind.
+        environment = dict(os.environ, PWD=os.getcwd())
         self._process = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True)
+            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True,
+            env=environment)
         self._lines = []
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
