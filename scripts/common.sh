@@ -11,7 +11,7 @@ fail() {
   exit 1
 }
 
-# The column of packages.txt that is for this machine: 2 or 3.
+# The column of packages.txt that is for this machine: 2, 3 or 4.
 package_column() {
   local id='' version='' like=''
   if [ -r /etc/os-release ]; then
@@ -20,7 +20,8 @@ package_column() {
     like=$(. /etc/os-release && echo "${ID_LIKE:-}")
   fi
   case "$id $version" in
-    'debian 12' | 'debian 13') echo 2 ;;
+    'debian 12') echo 2 ;;
+    'debian 13') echo 4 ;;
     'ubuntu 20.04') echo 3 ;;
     *)
       case " $id $like " in
@@ -40,7 +41,10 @@ missing_packages() {
   local column wanted installed
   column=$(package_column)
   wanted=$(awk -v uses=" $* " -v column="$column" \
-    '!/^#/ && NF && index(uses, " " $1 " ") && $column != "-" { print $column }' \
+    '!/^#/ && NF && index(uses, " " $1 " ") {
+       name = column <= NF ? $column : $2  # Debian 13 differs from 12 in few
+       if (name != "-") print name
+     }' \
     "$root/scripts/packages.txt" | sort -u)
   # shellcheck disable=SC2016  # the ${} are dpkg-query's
   # dpkg-query fails when it knows nothing of one of them, and still lists the others.
