@@ -1,8 +1,9 @@
-// Numbers as people write and read them.
+// Numbers and lists as people write and read them.
 #pragma once
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "ball_sim/vector.hpp"
 
@@ -13,6 +14,9 @@ std::string formatNumber(double value);
 
 /// "(x, y, z)".
 std::string formatVector(const Vector3& vector);
+
+/// "a, b, c".
+std::string formatList(const std::vector<std::string>& names);
 
 /// A decimal number as YAML and C write it, in the C locale whatever the program's is; nothing for
 /// any other text, infinities and NaN included, and for numbers too large for a double.

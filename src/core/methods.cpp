@@ -4,20 +4,16 @@
 #include <stdexcept>
 
 #include "ball_sim/brute_force.hpp"
+#include "ball_sim/text.hpp"
 #include "event_driven/make_event_driven.hpp"
 
 namespace ball_sim::core {
 
 namespace {
 
-std::string listOf(const std::vector<std::string>& names) {
-  std::string list;
-  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
-  return list;
-}
-
 [[noreturn]] void refuse(const std::string& name) {
-  throw std::invalid_argument("method: '" + name + "': must be one of " + listOf(methodNames()));
+  throw std::invalid_argument("method: '" + name + "': must be one of " +
+                              formatList(methodNames()));
 }
 
 }  // namespace

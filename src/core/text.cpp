@@ -23,6 +23,12 @@ std::string formatVector(const Vector3& vector) {
          formatNumber(vector.z()) + ")";
 }
 
+std::string formatList(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
 std::optional<double> parseDecimal(const std::string& text) {
   if (text.find_first_not_of("0123456789+-.eE") != std::string::npos) return std::nullopt;
   std::istringstream stream(text);

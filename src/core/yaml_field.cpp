@@ -51,12 +51,6 @@ std::optional<double> parseYamlNumber(const std::string& text) {
   return parseDecimal(text);
 }
 
-std::string joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
-
 }  // namespace
 
 YamlField::YamlField(std::string source, std::string key, const YAML::Node& node)
@@ -149,7 +143,7 @@ std::vector<YamlField> YamlField::listUpTo(std::size_t most) const {
 }
 
 void YamlField::demandMap(const std::vector<std::string>& known) const {
-  if (!node_.IsMap()) fail("must be a map of " + joined(known));
+  if (!node_.IsMap()) fail("must be a map of " + formatList(known));
   std::set<std::string> seen;
   for (const auto& pair : node_) {
     if (!pair.first.IsScalar()) {
@@ -161,7 +155,7 @@ void YamlField::demandMap(const std::vector<std::string>& known) const {
       const std::optional<std::string> near = nearestName(name, known);
       throw SceneError(where + shown(pair.second) + ": unknown key" +
                        (near ? ", did you mean '" + *near + "'?" : "") +
-                       " (known: " + joined(known) + ")");
+                       " (known: " + formatList(known) + ")");
     }
     if (!seen.insert(name).second) {
       throw SceneError(where + shown(pair.second) + ": the key must not be given twice");

@@ -14,14 +14,6 @@
 namespace ball_sim {
 namespace {
 
-std::string join(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) {
-    text += (text.empty() ? "" : ", ") + name;
-  }
-  return text;
-}
-
 std::string describe(const XmlRpc::XmlRpcValue& value) {
   std::ostringstream text;
   value.write(text);
@@ -95,9 +87,9 @@ class Reader {
       const std::string name = full_name.substr(prefix.size());
       if (std::find(known_.begin(), known_.end(), name) == known_.end()) {
         const std::optional<std::string> near = core::nearestName(name, known_);
-        ROS_WARN_STREAM("unknown parameter ~"
-                        << name << " is ignored; "
-                        << (near ? "did you mean ~" + *near + "?" : "known are: " + join(known_)));
+        ROS_WARN_STREAM("unknown parameter ~" << name << " is ignored; "
+                                              << (near ? "did you mean ~" + *near + "?"
+                                                       : "known are: " + core::formatList(known_)));
       }
     }
   }
@@ -166,7 +158,7 @@ Parameters readParameters(const ros::NodeHandle& private_node) {
   if (const auto name = reader.text("color_by")) {
     const auto color_by = colorByName(*name);
     if (!color_by) {
-      Reader::refuse("color_by", *name, "must be one of " + join(colorByNames()));
+      Reader::refuse("color_by", *name, "must be one of " + core::formatList(colorByNames()));
     }
     p.color_by = *color_by;
   }

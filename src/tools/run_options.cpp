@@ -17,12 +17,6 @@ namespace {
 // More states than that would fill any disk: the step is a slip.
 constexpr double kMostStates = 1e9;
 
-std::string joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
-
 [[noreturn]] void refuse(const std::string& argument, const std::string& value,
                          const std::string& rule) {
   throw ArgumentError(argument + ": " + (value.empty() ? "''" : value) + ": " + rule);
@@ -45,7 +39,7 @@ std::string path(const std::string& argument, const std::string& value) {
 std::string methodName(const std::string& argument, const std::string& value) {
   const std::vector<std::string>& names = methodNames();
   if (std::find(names.begin(), names.end(), value) == names.end()) {
-    refuse(argument, value, "must be one of " + joined(names));
+    refuse(argument, value, "must be one of " + formatList(names));
   }
   return value;
 }
@@ -89,7 +83,7 @@ const std::map<std::string, bool RunOptions::*>& switches() {
   std::vector<std::string> known;
   for (const auto& setter : setters()) known.push_back(setter.first);
   for (const auto& one : switches()) known.push_back(one.first);
-  refuse(argument, "unknown", "must be one of " + joined(known));
+  refuse(argument, "unknown", "must be one of " + formatList(known));
 }
 
 void checkTogether(const RunOptions& options) {
@@ -168,7 +162,7 @@ std::string helpText() {
          "\n"
          "  --until T            simulated time to run to, s; required, above 0\n"
          "  --method M           overrides the scene's method: " +
-         joined(methodNames()) +
+         formatList(methodNames()) +
          "\n"
          "  --time-step DT       overrides the scene's time_step, s (stepping methods)\n"
          "  --out FILE           writes states as CSV: time,id,x,y,z,vx,vy,vz (s, m, m/s), with "

@@ -382,7 +382,6 @@ class CellLevel {
 template <class Real>
 struct GridAxis {
   Real origin = 0;  ///< m, lower end of cell 0
-  Real length = 0;  ///< m, of a periodic axis
   bool periodic = false;
   bool flat = false;        ///< all balls share one coordinate: one cell, no crossings
   bool lower_wall = false;  ///< a box face at the lower end of cell 0

@@ -97,7 +97,6 @@ CellGrid<Real> layOutGrid(const Surroundings& surroundings,
     GridAxis<Real>& axis = axes[k];
     if (axis.flat) continue;
     axis.cells = static_cast<std::uint32_t>(cut(k));
-    axis.length = length[k];
     axis.origin = low[k];
     if (!axis.open()) {
       axis.edge = length[k] / Real(axis.cells);
