@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,15 @@ namespace ball_sim::core {
 /// The arithmetic a method runs in. long_double (64-bit significand on x86-64) is slower and there
 /// to tell rounding from error: what does not shrink with it is a bug, not rounding.
 enum class Precision { double_precision, long_double };
+
+/// How a method is to run. Each method takes what concerns it and leaves the rest.
+struct MethodSettings {
+  Precision precision = Precision::double_precision;
+  double time_step = 1e-3;          ///< s, > 0, for the stepping methods
+  std::optional<double> tolerance;  ///< relative to a radius; absent: as exact as can be
+  SimultaneousImpacts simultaneous_impacts = SimultaneousImpacts::sequential;
+  unsigned threads = 1;  ///< >= 1; changes no bit of the result
+};
 
 /// A method's name, and why it was taken.
 struct MethodChoice {
@@ -30,6 +40,6 @@ MethodChoice chooseMethod(const std::string& name, const Scene& scene);
 /// @param name  a known name other than `auto`
 /// @throws std::invalid_argument  an unknown name
 std::unique_ptr<Method> makeMethod(const std::string& name, const Surroundings& surroundings,
-                                   Precision precision = Precision::double_precision);
+                                   const MethodSettings& settings = {});
 
 }  // namespace ball_sim::core

@@ -32,6 +32,7 @@ struct WorldOptions {
   std::string method;               ///< overrides the scene's; empty: the scene's
   std::optional<double> time_step;  ///< s, overrides the scene's
   Precision precision = Precision::double_precision;
+  unsigned threads = 1;  ///< >= 1, for the methods that can share their work
   std::size_t max_balls = 10'000'000;
 };
 

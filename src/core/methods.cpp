@@ -31,10 +31,10 @@ MethodChoice chooseMethod(const std::string& name, const Scene& /*scene*/) {
 }
 
 std::unique_ptr<Method> makeMethod(const std::string& name, const Surroundings& surroundings,
-                                   Precision precision) {
-  if (name == "event_driven") return makeEventDriven(surroundings, precision);
+                                   const MethodSettings& settings) {
+  if (name == "event_driven") return makeEventDriven(surroundings, settings.precision);
   if (name != "brute_force") refuse(name);
-  if (precision == Precision::double_precision) {
+  if (settings.precision == Precision::double_precision) {
     return std::make_unique<BruteForce<double>>(surroundings);
   }
   return std::make_unique<BruteForce<long double>>(surroundings);

@@ -71,8 +71,13 @@ World::World(const Scene& scene, const WorldOptions& options) : scene_(scene), o
 }
 
 void World::build(Time start) {
-  std::unique_ptr<Method> method =
-      makeMethod(choice_.name, scene_.surroundings, options_.precision);
+  MethodSettings settings;
+  settings.precision = options_.precision;
+  settings.time_step = scene_.time_step;
+  settings.tolerance = scene_.tolerance;
+  settings.simultaneous_impacts = scene_.simultaneous_impacts;
+  settings.threads = options_.threads;
+  std::unique_ptr<Method> method = makeMethod(choice_.name, scene_.surroundings, settings);
   method->advanceTo(start);
   method_ = std::move(method);
   method_->setCollisionLog(log_);

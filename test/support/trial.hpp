@@ -26,15 +26,17 @@ struct TestScene {
 /// A method that holds a scene's balls and logs every impact from time 0 on.
 class Trial {
  public:
-  Trial(const std::string& method, const TestScene& scene,
-        Precision precision = Precision::double_precision)
+  Trial(const std::string& method, const TestScene& scene, const MethodSettings& settings = {})
       : log_(std::make_unique<CollisionLog>()),
-        method_(makeMethod(method, scene.surroundings, precision)) {
+        method_(makeMethod(method, scene.surroundings, settings)) {
     method_->setCollisionLog(log_.get());
     for (std::size_t i = 0; i < scene.balls.size(); ++i) {
       method_->insert(static_cast<BallId>(i), scene.balls[i]);
     }
   }
+
+  Trial(const std::string& method, const TestScene& scene, Precision precision)
+      : Trial(method, scene, settingsOf(precision)) {}
 
   /// Advances to a date, s. More than `most_events` is a failure: a stalled clock must not hang
   /// the tests.
@@ -60,6 +62,12 @@ class Trial {
   Vector3 velocity(BallId id) const { return method_->ball(id).velocity; }
 
  private:
+  static MethodSettings settingsOf(Precision precision) {
+    MethodSettings settings;
+    settings.precision = precision;
+    return settings;
+  }
+
   std::unique_ptr<CollisionLog> log_;  // outlives the method, and stays where it is
   std::unique_ptr<Method> method_;
 };
