@@ -25,7 +25,9 @@ namespace {
 constexpr int kFinest = 14;  // the shortest step is R/v 2^-kFinest
 constexpr int kPhases = 20;  // one fixed phase would hide an error of first order
 constexpr int kFewestPhases = 3;
-constexpr double kLongest = 20;  // s of CPU time, for one step length by one entrant
+constexpr std::size_t kMany = 200;  // balls: their steps are dear, and may take
+constexpr double kManyFold = 5;     // so many times as long
+constexpr double kLongest = 20;     // s of CPU time, for one step length by one entrant
 
 struct Options {
   std::string source = BALL_SIM_SOURCE_DIR;
@@ -202,7 +204,8 @@ class Report {
     const double per_second =
         entrant.cost * 1e-9 * static_cast<double>(one.scene.balls.size()) / step;
     const double one_path = 2 * per_second * one.horizon;  // timed, and looked at
-    const int affordable = static_cast<int>(std::min(effort_.path_budget / one_path, 1e6));
+    const double budget = effort_.path_budget * (one.scene.balls.size() > kMany ? kManyFold : 1);
+    const int affordable = static_cast<int>(std::min(budget / one_path, 1e6));
     const int phases = std::min(effort_.phases, affordable);
     if (one.horizon / step >= 4 && phases >= kFewestPhases) {
       RandomSource random(static_cast<std::uint64_t>(k) + 1);

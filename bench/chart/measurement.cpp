@@ -227,6 +227,7 @@ Row measurePath(const PreparedScene& scene, const Trajectory& truth, double hori
     witnessPath(row, scene, truth, entrant, balls);
   } catch (const std::exception& error) {
     row.failure = error.what();
+    row.error.reset();
   }
   return row;
 }

@@ -1,9 +1,10 @@
 // Box2D 2.4 (box2d.org), planar, single precision (it has no other).
 //
-// Settings: 8 velocity and 3 position iterations (the manual's advice); restitutionThreshold 0;
-// continuous detection against walls on (the default), among balls off: a "bullet" costs tenfold
-// and gains nothing at these speeds. Built-in limits stay: no ball goes further than 2 m a step
-// (b2_maxTranslation). Walls are boxes 20 m thick.
+// Settings: 8 velocity and 3 position iterations (the manual's advice); restitutionThreshold 0, but
+// under gravity its default of 1 m/s, without which a stack jumps apart; continuous detection
+// against walls on (the default), among balls off: a "bullet" costs tenfold and gains nothing at
+// these speeds. Built-in limits stay: no ball goes further than 2 m a step (b2_maxTranslation).
+// Walls are boxes 20 m thick.
 #include <box2d/box2d.h>
 
 #include <cmath>
@@ -16,6 +17,7 @@ namespace {
 
 constexpr float kThickness = 20;  // m
 constexpr float kLength = 1000;   // m
+constexpr float kThreshold = 1;   // m/s, b2FixtureDef's default of restitutionThreshold
 
 b2Vec2 toBox2d(const Vector3& v) { return {static_cast<float>(v.x()), static_cast<float>(v.y())}; }
 Vector3 fromBox2d(const b2Vec2& v) { return {double(v.x), double(v.y), 0}; }
@@ -25,6 +27,7 @@ class Box2d final : public Peer {
   Box2d(const Surroundings& surroundings, const std::vector<Ball>& balls, double step)
       : world_(toBox2d(surroundings.gravity)),
         restitution_(static_cast<float>(surroundings.restitution)),
+        threshold_(surroundings.gravity == Vector3::Zero() ? 0 : kThreshold),
         step_(static_cast<float>(step)) {
     world_.SetAllowSleeping(false);
     for (const Wall<double>& wall : wallsOf<double>(surroundings)) addWall(wall);
@@ -65,7 +68,7 @@ class Box2d final : public Peer {
     definition.density = density;
     definition.friction = 0;
     definition.restitution = restitution_;
-    definition.restitutionThreshold = 0;
+    definition.restitutionThreshold = threshold_;
     definition.userData.pointer = static_cast<uintptr_t>(partner);
     body->CreateFixture(&definition);
   }
@@ -96,7 +99,8 @@ class Box2d final : public Peer {
   b2World world_;
   std::vector<b2Body*> balls_;
   float restitution_;
-  float step_;  // s
+  float threshold_;  // m/s, least approach that bounces
+  float step_;       // s
 };
 
 }  // namespace

@@ -2,10 +2,11 @@
 //
 // Settings: sequential impulses, 10 iterations (the default); restitution as the product of two, so
 // each gets its root; m_restitutionVelocityThreshold 0, as below it Bullet does not bounce at all
-// (bullet3 #1530); split impulse for every depth, which moves overlapping balls apart without
-// giving them speed (btContactSolverInfo.h); contacts only where balls touch
-// (setContactProcessingThreshold), as those ahead of time take energy from a bounce. No continuous
-// detection: it stops a ball at its impact and halves the energy of a head-on hit.
+// (bullet3 #1530), but under gravity its default of 0.2 m/s, which lets balls come to rest; split
+// impulse for every depth, which moves overlapping balls apart without giving them speed
+// (btContactSolverInfo.h); contacts only where balls touch (setContactProcessingThreshold), as
+// those ahead of time take energy from a bounce. No continuous detection: it stops a ball at its
+// impact and halves the energy of a head-on hit.
 #define BT_USE_DOUBLE_PRECISION
 #include <btBulletDynamicsCommon.h>
 
@@ -29,7 +30,7 @@ class Bullet final : public Peer {
         step_(step) {
     world_.setGravity(toBullet(surroundings.gravity));
     btContactSolverInfo& info = world_.getSolverInfo();
-    info.m_restitutionVelocityThreshold = 0;
+    if (surroundings.gravity == Vector3::Zero()) info.m_restitutionVelocityThreshold = 0;
     info.m_splitImpulse = 1;
     info.m_splitImpulsePenetrationThreshold = 0;
     info.m_numIterations = 10;
