@@ -11,18 +11,23 @@ constexpr std::uint64_t kMostEvents = 2'000'000'000;
 
 class OwnSimulation final : public Simulation {
  public:
-  OwnSimulation(const std::string& method, const Surroundings& surroundings,
+  OwnSimulation(const std::string& method, bool in_frames, const Surroundings& surroundings,
                 const std::vector<Ball>& balls, double step)
-      : method_(makeMethod(method, surroundings, settingsOf(step))), step_(step) {
+      : method_(makeMethod(method, surroundings, settingsOf(step))),
+        step_(step),
+        in_frames_(in_frames) {
     for (std::size_t i = 0; i < balls.size(); ++i) {
       method_->insert(static_cast<BallId>(i), balls[i]);
     }
   }
 
+  // A frame of `continuous` is one call; event_driven and brute_force go all the way in one.
   void advance(std::uint64_t steps) override {
-    steps_ += steps;
-    const Time target = Time::fromSeconds(static_cast<double>(steps_) * step_);
-    if (!method_->advanceTo(target, kMostEvents)) throw std::runtime_error("the clock stalls");
+    for (std::uint64_t i = 0; i < (in_frames_ ? steps : 1); ++i) {
+      steps_ += in_frames_ ? 1 : steps;
+      const Time target = Time::fromSeconds(static_cast<double>(steps_) * step_);
+      if (!method_->advanceTo(target, kMostEvents)) throw std::runtime_error("the clock stalls");
+    }
   }
 
   void read(BallStates& states) override { method_->read(states); }
@@ -51,7 +56,8 @@ class OwnSimulation final : public Simulation {
 
   CollisionLog log_;  // outlives the method
   std::unique_ptr<Method> method_;
-  double step_;              // s
+  double step_;  // s
+  bool in_frames_;
   std::uint64_t steps_ = 0;  // so far
 };
 
@@ -73,9 +79,9 @@ std::vector<Entrant> ownMethods() {
     entrant.cost = 150;
     entrant.refusal = [](const PreparedScene&) { return std::string(); };
     if (name == "brute_force") entrant.refusal = refusalOfBruteForce;
-    entrant.make = [name](const Surroundings& surroundings, const std::vector<Ball>& balls,
-                          double step) {
-      return std::make_unique<OwnSimulation>(name, surroundings, balls, step);
+    entrant.make = [name, exact](const Surroundings& surroundings, const std::vector<Ball>& balls,
+                                 double step) {
+      return std::make_unique<OwnSimulation>(name, !exact, surroundings, balls, step);
     };
     entrants.push_back(entrant);
   }
