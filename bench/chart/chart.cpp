@@ -206,7 +206,7 @@ class Report {
     const double one_path = 2 * per_second * one.horizon;  // timed, and looked at
     const double budget = effort_.path_budget * (one.scene.balls.size() > kMany ? kManyFold : 1);
     const int affordable = static_cast<int>(std::min(budget / one_path, 1e6));
-    const int phases = std::min(effort_.phases, affordable);
+    const int phases = std::min({effort_.phases, affordable, one.scene.plan.repeats});
     if (one.horizon / step >= 4 && phases >= kFewestPhases) {
       RandomSource random(static_cast<std::uint64_t>(k) + 1);
       measurePath(one.scene, one.truth, one.horizon, entrant, step, 0);  // warms up

@@ -34,6 +34,8 @@ def mostly_failed(row):
 
 def draw_lines(axes, rows, measure, floor=FLOOR, hollow=False, lower=None, upper=None):
     """One line an entrant; where most runs failed, a cross at the top edge."""
+    useful = [value(row, 'cost') for row in rows if row['cost'] and not mostly_failed(row)]
+    fastest = min(useful, default=1e-9)  # runs that lost their balls cost nothing: to the left edge
     for name, points in lines(rows):
         colour, sign, _ = style.look(name)
         good = [p for p in points if not mostly_failed(p) and measure(p) is not None]
@@ -50,7 +52,7 @@ def draw_lines(axes, rows, measure, floor=FLOOR, hollow=False, lower=None, upper
                 if low is not None and high is not None:
                     axes.plot([cost, cost], [max(low, floor), max(high, floor)], color=colour,
                               linewidth=0.7, alpha=0.6, zorder=2)
-        failed = [value(p, 'cost') for p in points if mostly_failed(p)]
+        failed = [max(value(p, 'cost'), fastest / 4) for p in points if mostly_failed(p)]
         top = axes.get_xaxis_transform()
         axes.plot(failed, [0.985] * len(failed), color=colour, marker='x', linestyle='none',
                   markersize=5, transform=top, clip_on=False, zorder=4)

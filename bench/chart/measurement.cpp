@@ -124,13 +124,13 @@ void witnessPath(Row& row, const PreparedScene& scene, const Trajectory& truth,
     row.failure = defect(scene, states, true_energy);
     if (!row.failure.empty()) break;
     row.error = largestError(scene, truth, date, states) / scene.reach;
-    if (*row.error > kValid && !row.valid_time) row.valid_time = date;
+    if (*row.error > kValid && !row.valid_time) row.valid_time = date - begin;
     if (step % deep_stride == 0 || last) {
       overlap = std::max(overlap, deepestOverlap(scene, states));
     }
   }
   row.valid_to_end = !row.valid_time;
-  if (row.valid_to_end) row.valid_time = date;
+  if (row.valid_to_end) row.valid_time = date - begin;
   if (!row.failure.empty()) row.error.reset();
   row.overlap = std::max(overlap, run->work().deepest_overlap) / scene.reach;
   row.events = run->work().events;

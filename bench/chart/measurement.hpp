@@ -26,13 +26,13 @@ struct Row {
   double phase = 0;  ///< start of the run, in steps
   std::size_t balls = 0;
   std::uint64_t steps = 0;
-  double simulated = 0;                  ///< s
-  double cpu = 0;                        ///< s
-  std::optional<std::uint64_t> events;   ///< handled, real impacts or not
-  std::optional<double> error;           ///< largest |dx|/R in the end
-  std::optional<double> valid_time;      ///< s until an error of 0.01 R was seen
-  bool valid_to_end = false;             ///< it never was
-  std::optional<double> energy_error;    ///< of the energy at the start
+  double simulated = 0;                 ///< s
+  double cpu = 0;                       ///< s
+  std::optional<std::uint64_t> events;  ///< handled, real impacts or not
+  std::optional<double> error;          ///< largest |dx|/R in the end
+  std::optional<double> valid_time;    ///< s from the run's start until an error of 0.01 R was seen
+  bool valid_to_end = false;           ///< it never was
+  std::optional<double> energy_error;  ///< of the energy at the start
   std::optional<double> momentum_error;  ///< of the sum of |m v|
   std::optional<double> overlap;         ///< deepest, of R
   std::optional<std::uint64_t> true_impacts;

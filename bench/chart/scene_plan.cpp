@@ -38,7 +38,7 @@ std::vector<ScenePlan> allPlans() {
       {"pi_billiard", here + "pi_billiard.yaml",
        "masses 1 : 1 000 000 and a wall: 3141 impacts, the digits of pi", 1, 4},
       {"cradle", here + "cradle.yaml", "Newton's cradle with small gaps: one in, one out", 0.5, 4},
-      {"twelve_discs", here + "twelve_discs.yaml", "twelve discs in a closed box", 1, 0.5, 300},
+      {"twelve_discs", here + "twelve_discs.yaml", "twelve discs in a closed box", 1, 0.15, 300},
       fluid("0.2", "100", 0.8, 80, 100),
       fluid("0.2", "10000", 0.8, 2, 30),
       fluid("0.5", "100", 0.2, 25, 30),

@@ -27,7 +27,7 @@ struct ScenePlan {
   double statistics = 0;  ///< s, rates are counted for so long; 0: no statistics
   double mixing = 0;      ///< s, run before the start, so that a fluid is in equilibrium
   Truth truth = Truth::multiprecision;
-  int repeats = 20;  ///< of exact methods
+  int repeats = 20;  ///< of a run at most
 };
 
 /// All scenes, in the order of the report.
