@@ -203,7 +203,8 @@ class Report {
     const double step = stepOf(one, k);
     const double per_second =
         entrant.cost * 1e-9 * static_cast<double>(one.scene.balls.size()) / step;
-    const double one_path = 2 * per_second * one.horizon;  // timed, and looked at
+    const double setup = entrant.setup_cost * static_cast<double>(one.scene.balls.size());
+    const double one_path = 2 * (per_second * one.horizon + setup);  // timed, and looked at
     const double budget = effort_.path_budget * (one.scene.balls.size() > kMany ? kManyFold : 1);
     const int affordable = static_cast<int>(std::min(budget / one_path, 1e6));
     const int phases = std::min({effort_.phases, affordable, one.scene.plan.repeats});

@@ -157,7 +157,7 @@ def lay_out(figure, names, notes):
     legend_rows = (len(names) + 1 + 5) // 6
     legend(figure, names, loc='lower center', ncol=6, bbox_to_anchor=(0.5, small_print / height))
     bottom = small_print + 0.25 * legend_rows + 0.55
-    figure.subplots_adjust(left=0.065, right=0.99, wspace=0.24, hspace=0.36, bottom=bottom / height,
+    figure.subplots_adjust(left=0.065, right=0.99, wspace=0.24, hspace=0.42, bottom=bottom / height,
                            top=1 - 0.75 / height)
 
 
@@ -170,7 +170,8 @@ def legend(figure, names, **where):
                                   markersize=10 if name == 'event_driven' else 5))
     handles.append(plt.Line2D([], [], color='#404040', marker='x', linestyle='none',
                               label='failed (most runs)'))
-    figure.legend(handles=handles, frameon=False, **where)
+    figure.legend(handles=handles, frameon=False, fontsize=8, columnspacing=1.2,
+                  handletextpad=0.5, **where)
 
 
 def note_text(rows):
@@ -230,7 +231,7 @@ def draw_overview(scenes, rows, machine, path):
             no_panel(axes, name + ': not measured')
             continue
         draw_error(axes, some)
-        axes.set_title(textwrap.fill(scenes[name]['question'], 44), fontsize=9)
+        axes.set_title(textwrap.fill(scenes[name]['question'], 40), fontsize=9)
         axes.set_ylabel('')
         axes.set_xlabel(COST)
         names |= {row['entrant'] for row in some if row['cost']}

@@ -54,6 +54,7 @@ struct Entrant {
   /// CPU time of one ball in one step, ns, roughly: says how fine its steps may become. Fixed, so
   /// that the rows of a report do not depend on the machine.
   double cost = 100;
+  double setup_cost = 0;  ///< CPU time to set up one ball, s, likewise
   /// Why it cannot run a scene; empty: it can.
   std::function<std::string(const PreparedScene&)> refusal;
   /// @param step  s

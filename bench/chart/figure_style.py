@@ -66,5 +66,5 @@ def save(figure, path):
     figure.savefig(path, dpi=100, metadata={'Software': None})
     plt.close(figure)
     with Image.open(path) as image:
-        few = image.convert('RGB').quantize(96, method=Image.Quantize.MEDIANCUT, dither=0)
+        few = image.convert('RGB').quantize(200, method=Image.Quantize.MEDIANCUT, dither=0)
     few.save(path, optimize=True)

@@ -111,6 +111,7 @@ void witnessPath(Row& row, const PreparedScene& scene, const Trajectory& truth,
       scene.balls.size() > kMany ? std::max<std::uint64_t>(row.steps / kDeepLooks, 1) : stride;
   double overlap = 0;
   double date = begin;
+  double last_right = begin;
   BallStates states;
   std::vector<Impact> impacts;
   run->takeImpacts(impacts);
@@ -124,7 +125,8 @@ void witnessPath(Row& row, const PreparedScene& scene, const Trajectory& truth,
     row.failure = defect(scene, states, true_energy);
     if (!row.failure.empty()) break;
     row.error = largestError(scene, truth, date, states) / scene.reach;
-    if (*row.error > kValid && !row.valid_time) row.valid_time = date - begin;
+    if (*row.error > kValid && !row.valid_time) row.valid_time = last_right - begin;
+    last_right = date;
     if (step % deep_stride == 0 || last) {
       overlap = std::max(overlap, deepestOverlap(scene, states));
     }

@@ -30,7 +30,7 @@ struct Row {
   double cpu = 0;                       ///< s
   std::optional<std::uint64_t> events;  ///< handled, real impacts or not
   std::optional<double> error;          ///< largest |dx|/R in the end
-  std::optional<double> valid_time;    ///< s from the run's start until an error of 0.01 R was seen
+  std::optional<double> valid_time;    ///< s from the start to the last look before an error of 0.01 R
   bool valid_to_end = false;           ///< it never was
   std::optional<double> energy_error;  ///< of the energy at the start
   std::optional<double> momentum_error;  ///< of the sum of |m v|
