@@ -250,7 +250,8 @@ def main():
     data, figures = sys.argv[1:3]
     rows = style.read(os.path.join(data, 'chart.csv'))
     scenes = {row['scene']: row for row in style.read(os.path.join(data, 'chart_scenes.csv'))}
-    facts = {row['fact']: row['value'] for row in style.read(os.path.join(data, 'chart_machine.csv'))}
+    machine_rows = style.read(os.path.join(data, 'chart_machine.csv'))
+    facts = {row['fact']: row['value'] for row in machine_rows}
     machine = '{cpu}, one thread; {compiler}, {flags}; commit {commit}.'.format(**facts)
     os.makedirs(figures, exist_ok=True)
     for name, scene in scenes.items():

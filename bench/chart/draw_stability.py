@@ -16,8 +16,8 @@ X = 'speed_time_step_per_radius'
 # Light to dark as it gets worse, and a sign each, so that no colour has to be told from another.
 VERDICTS = {'holds': ('#cfe3f3', ''), 'degrades': ('#f0b64d', '○'), 'fails': ('#a83232', '×')}
 SIGN_COLOURS = {'degrades': '#5a3a00', 'fails': 'white'}
-BOUNDS = ('Small gases in a periodic box. Holds: energy within 0.01, overlap within 0.05 radii, impacts '
-          'within 0.05; degrades: within 0.1, 0.5 and 0.2; fails: beyond. What\ndoes not vary is at '
+BOUNDS = ('Small gases in a periodic box. Holds: energy within 0.01, overlap within 0.05 radii, '
+          'impacts within 0.05; degrades: within 0.1, 0.5 and 0.2; fails: beyond. What\ndoes not vary is at '
           'packing fraction 0.2, restitution 1, mass ratio 1. Source: bench/stability_map.cpp.')
 NAMES = {'packing_fraction': 'packing fraction', 'restitution': 'restitution',
          'mass_ratio': 'mass ratio'}
@@ -42,7 +42,8 @@ def draw_map(axes, rows, quantity, columns, levels):
     axes.set_xticks(range(0, len(columns), 2))
     axes.set_xticklabels([level(c) for c in columns[::2]])
     axes.set_yticks(range(len(levels)))
-    axes.set_yticklabels([level(v) for v in levels] if axes.get_subplotspec().is_first_col() else [])
+    first = axes.get_subplotspec().is_first_col()
+    axes.set_yticklabels([level(v) for v in levels] if first else [])
     axes.grid(False)
     axes.tick_params(length=0)
     for spine in axes.spines.values():
