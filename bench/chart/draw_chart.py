@@ -253,6 +253,7 @@ def main():
     machine_rows = style.read(os.path.join(data, 'chart_machine.csv'))
     facts = {row['fact']: row['value'] for row in machine_rows}
     machine = '{cpu}, one thread; {compiler}, {flags}; commit {commit}.'.format(**facts)
+    machine = textwrap.fill(machine, 165)
     os.makedirs(figures, exist_ok=True)
     for name, scene in scenes.items():
         some = [row for row in rows if row['scene'] == name]
