@@ -30,9 +30,10 @@ struct Row {
   double cpu = 0;                       ///< s
   std::optional<std::uint64_t> events;  ///< handled, real impacts or not
   std::optional<double> error;          ///< largest |dx|/R in the end
-  std::optional<double> valid_time;    ///< s from the start to the last look before an error of 0.01 R
-  bool valid_to_end = false;           ///< it never was
-  std::optional<double> energy_error;  ///< of the energy at the start
+  std::optional<double>
+      valid_time;             ///< s from the start to the last look before an error of 0.01 R
+  bool valid_to_end = false;  ///< it never was
+  std::optional<double> energy_error;    ///< of the energy at the start
   std::optional<double> momentum_error;  ///< of the sum of |m v|
   std::optional<double> overlap;         ///< deepest, of R
   std::optional<std::uint64_t> true_impacts;
