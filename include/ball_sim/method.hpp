@@ -102,6 +102,10 @@ class Method {
 
   virtual Statistics statistics() const = 0;
 
+  /// What the run asked of the method beyond its limits so far, as a sentence that names the limit
+  /// and the remedy; empty: nothing. What is beyond a limit for good makeMethod() refuses.
+  virtual std::string warning() const { return {}; }
+
   /// Reports each impact from now on; nullptr: none. The log must outlive the method or the call
   /// that takes it away.
   virtual void setCollisionLog(CollisionLog* log) = 0;

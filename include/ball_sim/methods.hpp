@@ -37,8 +37,11 @@ const std::vector<std::string>& methodNames();
 /// @throws std::invalid_argument  an unknown name, listing the known ones
 MethodChoice chooseMethod(const std::string& name, const Scene& scene);
 
+/// @throws std::invalid_argument  a time step, s, that is not finite or not above 0
+void checkTimeStep(double time_step);
+
 /// @param name  a known name other than `auto`
-/// @throws std::invalid_argument  an unknown name
+/// @throws std::invalid_argument  an unknown name; a time step the method can't go by
 std::unique_ptr<Method> makeMethod(const std::string& name, const Surroundings& surroundings,
                                    const MethodSettings& settings = {});
 

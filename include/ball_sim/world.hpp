@@ -101,6 +101,7 @@ class World {
   const Surroundings& surroundings() const { return scene_.surroundings; }
   const MethodChoice& method() const { return choice_; }
   Statistics statistics() const { return method_->statistics(); }
+  std::string warning() const { return method_->warning(); }  ///< see Method::warning()
   double kineticEnergy() const;    ///< J
   double potentialEnergy() const;  ///< J
   Vector3 momentum() const;        ///< kg m/s

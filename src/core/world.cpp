@@ -57,10 +57,7 @@ Refusal unknownBall(const std::string& ids, bool several) {
 World::World(const Scene& scene, const WorldOptions& options) : scene_(scene), options_(options) {
   if (!options_.method.empty()) scene_.method = options_.method;
   if (options_.time_step) scene_.time_step = *options_.time_step;
-  if (!(scene_.time_step > 0) || !std::isfinite(scene_.time_step)) {
-    throw std::invalid_argument("time_step: " + formatNumber(scene_.time_step) +
-                                ": must be a finite number of seconds above 0");
-  }
+  checkTimeStep(scene_.time_step);
   choice_ = chooseMethod(scene_.method, scene_);
   std::size_t count = scene_.balls.size();
   for (const Fill& fill : scene_.fill) count += fill.count;
