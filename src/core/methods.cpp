@@ -8,6 +8,7 @@
 #include "ball_sim/text.hpp"
 #include "discrete/discrete.hpp"
 #include "event_driven/make_event_driven.hpp"
+#include "soft_sphere/soft_sphere.hpp"
 
 namespace ball_sim::core {
 
@@ -21,7 +22,8 @@ namespace {
 }  // namespace
 
 const std::vector<std::string>& methodNames() {
-  static const std::vector<std::string> names = {"auto", "event_driven", "discrete", "brute_force"};
+  static const std::vector<std::string> names = {"auto", "event_driven", "discrete", "soft_sphere",
+                                                 "brute_force"};
   return names;
 }
 
@@ -43,6 +45,7 @@ std::unique_ptr<Method> makeMethod(const std::string& name, const Surroundings& 
   checkTimeStep(settings.time_step);
   if (name == "event_driven") return makeEventDriven(surroundings, settings.precision);
   if (name == "discrete") return makeDiscrete(surroundings, settings);
+  if (name == "soft_sphere") return makeSoftSphere(surroundings, settings);
   if (name != "brute_force") refuse(name);
   if (settings.precision == Precision::double_precision) {
     return std::make_unique<BruteForce<double>>(surroundings);

@@ -58,6 +58,7 @@ class SteppedMethod : public Method {
   double timeStep() const { return clock_.length(); }  ///< s
   Time stepDate() const { return clock_.last(); }      ///< of the step that is taken
 
+  std::size_t slotCount() const { return bodies_.size(); }     ///< slots are below this
   const std::vector<Slot>& movers() const { return movers_; }  ///< ascending
   SteppedBall& body(Slot slot) { return bodies_[slot]; }
   const SteppedBall& body(Slot slot) const { return bodies_[slot]; }
@@ -66,6 +67,7 @@ class SteppedMethod : public Method {
   NearPairs& near() { return near_; }
   const NearPairs& near() const { return near_; }
   std::vector<NearPair>& pairs() { return near_.pairs(); }
+  const std::vector<NearPair>& pairs() const { return near_.pairs(); }
   const Wall<double>& wallOf(const NearPair& pair) const {
     return near_.walls()[pair.b - kFirstWall];
   }
