@@ -165,7 +165,7 @@ TEST(Limits, DiscreteComesToRestInAboutTheTimeOfTheFormula) {
     // slower than 2 g dt, would have lasted 4 dt/(1 - e).
     const double late = bounces * kStep * (1 + 1 / e) + 4 * kStep / (1 - e);
     EXPECT_NEAR(run.collisions().back().time.seconds(), double(truth.restTime()), late) << e;
-    EXPECT_NEAR(run.position(0).z(), 0.5, 1e-9);  // what overlap resting contacts are left
+    EXPECT_NEAR(run.position(0).z(), 0.5, 5e-4);  // what overlap resting contacts are left
     EXPECT_LT(run.velocity(0).norm(), 1e-12);
   }
 }

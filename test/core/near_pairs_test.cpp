@@ -118,6 +118,7 @@ TEST(NearPairs, RemembersContactsWhoeverMoves) {
     pair.touching = pair.b == 1;
     pair.impulse = 3;
   }
+  near.list(balls.all, {2}, {0, 1}, 0.001, 0.001);  // not listed at all
   near.list(balls.all, {1, 2}, {0}, 0.001, 0.001);  // now under ball 1
   ASSERT_EQ(near.pairs().size(), 2u);
   for (const NearPair& pair : near.pairs()) {

@@ -15,7 +15,10 @@ namespace {
 constexpr double kRestingSteps = 2;
 
 // The loads of a pile change little from step to step; these sweeps settle what did change.
-constexpr int kMostLoadSweeps = 40;
+// Measured on 1000 balls poured into a box: overshooting by 0.3 brings them to rest in half the
+// time, more does not, and twenty sweeps do as well as forty.
+constexpr int kMostLoadSweeps = 20;
+constexpr double kOverrelaxation = 1.3;
 constexpr double kLoadAccuracy = 1e-4;  // of the speed that gravity gives in a step
 
 // A chain of touching balls passes an impulse on in one sweep when it runs up the ids, in as many
@@ -25,7 +28,14 @@ constexpr int kMostImpactSweeps = 32;
 // Overlap of resting contacts is taken away bit by bit, so that neighbours do not fight.
 constexpr int kSeparationSweeps = 4;
 constexpr double kSeparationShare = 0.3;
-constexpr double kLeastOverlap = 1e-9;  // of the radius: less is left alone
+constexpr double kLeftOverlap = 1e-3;  // of the radius, so that contacts do not open and close
+
+// A sleeping ball wakes when what a contact bears differs by this from what it bore when the ball
+// fell asleep. Loads that are still being found vary by some percent.
+constexpr double kLoadChange = 0.2;    // of the load then, and
+constexpr double kWeightChange = 0.1;  // of the ball's weight
+
+constexpr double kBeside = -0.1;  // cosine to gravity: partners not above this bear a ball
 
 constexpr double kFarthestMove = 0.5;  // radii in a step; further, and one impact in 200 is missed
 
@@ -34,7 +44,8 @@ constexpr double kFarthestMove = 0.5;  // radii in a step; further, and one impa
 Discrete::Discrete(const Surroundings& surroundings, double time_step)
     : SteppedMethod(surroundings, time_step),
       gravity_(surroundings.gravity),
-      restitution_(surroundings.restitution) {
+      restitution_(surroundings.restitution),
+      watch_(std::sqrt(dot(gravity_, gravity_)), time_step) {
   const double gained = std::sqrt(dot(gravity_, gravity_)) * time_step;  // m/s in a step
   resting_speed_ = restitution_ < 1 ? kRestingSteps * gained : 0;
   setMargin(resting_speed_ > 0 ? gained * time_step : 0);
@@ -53,14 +64,32 @@ void Discrete::step() {
   if (resting_speed_ > 0) {
     markResting();
     separate();
+    if (++steps_since_look_ == RestWatch::kLookEvery) fallAsleep();
   }
 }
 
 void Discrete::ballsChanged() {
-  const auto changed = [this](const Contact& contact) {
-    return isNew(contact.a) || (contact.b < kFirstWall && isNew(contact.b));
-  };
-  contacts_.erase(std::remove_if(contacts_.begin(), contacts_.end(), changed), contacts_.end());
+  watch_.resize(slotCount());
+  drowsy_.resize(slotCount());
+  const auto changed = [this](Slot slot) { return isNew(slot) || isPushed(slot); };
+  for (Slot slot = 0; slot < slotCount(); ++slot) {
+    if (changed(slot)) wake(slot);
+  }
+  near().forgetContactsIf([&](const NearPair& pair) {
+    if (pair.touching && !isWithWall(pair) && (changed(pair.a) || changed(pair.b))) {
+      wake(pair.a);
+      wake(pair.b);
+    }
+    return false;
+  });
+}
+
+// The contacts of the last step are between other balls, or seen from others.
+void Discrete::moversChanged() {
+  if (resting_speed_ == 0) return;
+  updatePairs(std::sqrt(fastest_squared_));
+  findContacts();
+  markResting();
 }
 
 // --- motion
@@ -114,6 +143,7 @@ void Discrete::fallAndRest() {
     acceleration(contact.a) -= contact.w_a * pull;
     if (contact.w_b > 0) acceleration(contact.b) += contact.w_b * pull;
   }
+  wakeWhereLoadsChanged();
   for (const Slot slot : movers()) {
     SteppedBall& ball = body(slot);
     noteSpeed(ball);
@@ -121,12 +151,12 @@ void Discrete::fallAndRest() {
   }
 }
 
-// Changes the load so that the contact parts at least at the speed wanted, if it bears anything.
+// Changes the load so that the contact parts at the speed wanted, or faster and bears nothing.
 // Returns the change of that speed, m/s.
 double Discrete::pressApart(Contact& contact, double wanted) {
   const double w = contact.w_a + contact.w_b;
   const double lacking = wanted - separationSpeed(contact);
-  const double load = std::max(0.0, contact.load + lacking / w);
+  const double load = std::max(0.0, contact.load + kOverrelaxation * lacking / w);
   const double change = load - contact.load;
   contact.load = load;
   if (change != 0) push(contact, change);
@@ -151,15 +181,17 @@ void Discrete::findContacts() {
   for (std::uint32_t i = 0; i < pairs().size(); ++i) {
     NearPair& pair = pairs()[i];
     if (!findContact(pair, contact)) {
+      if (pair.touching) wakeIfUnloaded(pair);
       pair.touching = false;
       continue;
     }
+    if (!pair.touching) pair.impulse = pair.reference = 0;
     contact.pair = i;
     contact.a = pair.a;
     contact.b = pair.b;
-    contact.load = pair.touching ? pair.impulse : 0;
+    contact.load = pair.impulse;
     contact.w_a = body(pair.a).w;
-    contact.w_b = isWithWall(pair) ? 0 : body(pair.b).w;
+    contact.w_b = mobility(pair.b);
     pair.touching = true;
     counts().deepest_overlap = std::max(counts().deepest_overlap, -contact.gap);
     contacts_.push_back(contact);
@@ -190,15 +222,17 @@ void Discrete::resolveImpacts() {
   bool again = !contacts_.empty();
   for (int sweep = 0; sweep < kMostImpactSweeps && again; ++sweep) {
     again = false;
-    for (const Contact& contact : contacts_) {
+    for (Contact& contact : contacts_) {
       if (contact.gap <= 0 && resolveImpact(contact)) again = true;
     }
   }
 }
 
 // Applies the collision law if the contact approaches, and faster than what rests.
-bool Discrete::resolveImpact(const Contact& contact) {
+bool Discrete::resolveImpact(Contact& contact) {
   if (-separationSpeed(contact) <= resting_speed_) return false;
+  if (standsAsleep(contact.b)) wake(contact.b);
+  contact.w_b = mobility(contact.b);
   const NearPair& pair = pairs()[contact.pair];
   SteppedBall& a = body(contact.a);
   double impulse = 0;
@@ -235,12 +269,13 @@ void Discrete::separate() {
     for (Contact& contact : contacts_) {
       if (!contact.resting || !findContact(pairs()[contact.pair], contact)) continue;
       SteppedBall& a = body(contact.a);
-      if (contact.gap >= -kLeastOverlap * a.radius) continue;
+      const double overlap = -contact.gap - kLeftOverlap * a.radius;
+      if (overlap <= 0) continue;
       const double w = contact.w_a + contact.w_b;
-      const Vector3 way = (-kSeparationShare * contact.gap) * contact.normal;
+      const Vector3 way = (kSeparationShare * overlap) * contact.normal;
       a.x -= (contact.w_a / w) * way;
       if (contact.w_b > 0) body(contact.b).x += (contact.w_b / w) * way;
-      farthest = std::max(farthest, -kSeparationShare * contact.gap);
+      farthest = std::max(farthest, kSeparationShare * overlap);
     }
     if (farthest == 0) break;
     moved += farthest;
@@ -248,11 +283,85 @@ void Discrete::separate() {
   near().noteMove(moved);
 }
 
+// --- sleep
+
+// Reciprocal of the mass that a contact sees in a partner, 1/kg.
+double Discrete::mobility(std::uint32_t partner) const {
+  return partner >= kFirstWall || isAsleep(partner) ? 0 : body(partner).w;
+}
+
+bool Discrete::standsAsleep(std::uint32_t partner) const {
+  return partner < kFirstWall && isAsleep(partner);
+}
+
+void Discrete::wake(Slot slot) {
+  watch_.restart(slot);
+  if (isAsleep(slot)) setAsleep(slot, false);
+}
+
+void Discrete::wakeWhereLoadsChanged() {
+  const double weight = dot(gravity_, gravity_) * timeStep() * timeStep();
+  for (const Contact& contact : contacts_) {
+    if (!standsAsleep(contact.b)) continue;
+    const double before = pairs()[contact.pair].reference;
+    const double least = kWeightChange * std::sqrt(weight) / body(contact.b).w;
+    if (std::abs(contact.load - before) > kLoadChange * before + least) wake(contact.b);
+  }
+}
+
+// A contact has opened: what bore a sleeping ball, or what it bore, is gone.
+void Discrete::wakeIfUnloaded(const NearPair& pair) {
+  if (standsAsleep(pair.b) && pair.reference > 0) wake(pair.b);
+}
+
+void Discrete::fallAsleep() {
+  steps_since_look_ = 0;
+  bool any = false;
+  for (const Slot slot : movers()) {
+    drowsy_[slot] = watch_.look(slot, body(slot)) ? 1 : 0;
+    any = any || drowsy_[slot] != 0;
+  }
+  if (!any) return;
+  keepAwakeOnMovingSupports();
+  for (const Slot slot : movers()) {
+    if (drowsy_[slot] == 0) continue;
+    body(slot).v = Vector3::Zero();
+    acceleration(slot) = Vector3::Zero();
+    setAsleep(slot, true);
+  }
+  for (const Contact& contact : contacts_) {
+    NearPair& pair = pairs()[contact.pair];
+    const bool fell = drowsy_[pair.a] != 0 || (contact.w_b > 0 && drowsy_[pair.b] != 0);
+    if (fell) pair.reference = pair.impulse;
+  }
+}
+
+// A ball that sleeps leaves its weight to what bears it, so that has to sleep as well.
+void Discrete::keepAwakeOnMovingSupports() {
+  const double level = kBeside * std::sqrt(dot(gravity_, gravity_));
+  bool again = true;
+  while (again) {
+    again = false;
+    for (const Contact& contact : contacts_) {
+      if (contact.load == 0 || contact.w_b == 0) continue;
+      const double down = dot(contact.normal, gravity_);  // > 0: b is below a
+      if (drowsy_[contact.a] != 0 && drowsy_[contact.b] == 0 && down > level) {
+        drowsy_[contact.a] = 0;
+        again = true;
+      }
+      if (drowsy_[contact.b] != 0 && drowsy_[contact.a] == 0 && -down > level) {
+        drowsy_[contact.b] = 0;
+        again = true;
+      }
+    }
+  }
+}
+
 // --- what there is to know
 
 Statistics Discrete::statistics() const {
   Statistics statistics = SteppedMethod::statistics();
-  statistics.bytes += contacts_.capacity() * sizeof(Contact);
+  statistics.bytes += contacts_.capacity() * sizeof(Contact) + drowsy_.capacity() + watch_.bytes();
   return statistics;
 }
 

@@ -8,8 +8,10 @@
 // impulses, none of them below 0, found by projected Gauss-Seidel from those of the step before
 // (Moreau, "Numerical aspects of the sweeping process", 1999; Catto, "Iterative dynamics with
 // temporal coherence", 2005). They act during the step as constant forces, so that a ball at rest
-// stays where it is. What overlap resting contacts have is taken away by moving the balls, never by
-// a velocity.
+// stays where it is. What resting contacts overlap by more than a thousandth of the radius is taken
+// away by moving the balls, never by a velocity. Balls that lie still (rest_watch.hpp) on others
+// that do fall asleep: they cost nothing and stand like walls until they are hit, touched, or borne
+// by or bearing another load, or what they touch is changed from outside.
 //
 // Gets right: momentum, and at e = 1 energy, to rounding: nothing is moved or sped up but by the
 // collision law. Piles rest: they neither sink nor creep. Misses: an impact is seen up to a step
@@ -27,6 +29,7 @@
 #include <vector>
 
 #include "ball_sim/methods.hpp"
+#include "discrete/rest_watch.hpp"
 #include "stepping/stepped_method.hpp"
 
 namespace ball_sim::core {
@@ -55,6 +58,7 @@ class Discrete final : public SteppedMethod {
 
   void step() override;
   void ballsChanged() override;
+  void moversChanged() override;
 
   void fall();
   void fallAndRest();
@@ -63,9 +67,16 @@ class Discrete final : public SteppedMethod {
   void findContacts();
   bool findContact(const NearPair& pair, Contact& contact) const;
   void resolveImpacts();
-  bool resolveImpact(const Contact& contact);
+  bool resolveImpact(Contact& contact);
   void markResting();
   void separate();
+  void wakeWhereLoadsChanged();
+  void wakeIfUnloaded(const NearPair& pair);
+  void wake(Slot slot);
+  void fallAsleep();
+  void keepAwakeOnMovingSupports();
+  double mobility(std::uint32_t partner) const;
+  bool standsAsleep(std::uint32_t partner) const;
   double separationSpeed(const Contact& contact) const;
   void push(const Contact& contact, double impulse);
 
@@ -73,6 +84,9 @@ class Discrete final : public SteppedMethod {
   double restitution_;
   double resting_speed_;  // m/s; 0: nothing rests
   std::vector<Contact> contacts_;
+  RestWatch watch_;
+  std::vector<std::uint8_t> drowsy_;  // one a slot: lies still, scratch of fallAsleep()
+  std::uint32_t steps_since_look_ = 0;
   double fastest_squared_ = 0;  // m^2/s^2, in the present step
   double farthest_ = 0;         // of its radius, that a ball moved in one step
 };

@@ -102,7 +102,7 @@ void SoftSphere::pull(NearPair& pair, const Contact& contact) {
 void SoftSphere::noteBegin(NearPair& pair, double approach_speed) {
   pair.touching = true;
   pair.impulse = 0;
-  pair.approach = std::max(0.0, approach_speed);
+  pair.reference = std::max(0.0, approach_speed);
   ++(isWithWall(pair) ? counts().wall_collisions : counts().ball_collisions);
 }
 
@@ -112,7 +112,7 @@ void SoftSphere::noteEnd(NearPair& pair) {
   const Vector3 normal =
       isWithWall(pair) ? Vector3(-wallOf(pair).normal)
                        : contactNormal<double>(near().between(pair, body(pair.a), body(pair.b)));
-  report(pair, normal, std::max(0.0, pair.impulse), pair.approach);
+  report(pair, normal, std::max(0.0, pair.impulse), pair.reference);
 }
 
 // Reciprocal of the reduced mass, 1/kg.

@@ -48,7 +48,6 @@ class SoftSphere final : public SteppedMethod {
   };
 
   void step() override;
-  void ballsChanged() override {}
 
   void move();
   void pullAll();

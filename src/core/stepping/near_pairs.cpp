@@ -198,34 +198,42 @@ void NearPairs::findWallsOf(const SteppedBall& ball, Slot mover, double margin) 
 }
 
 void NearPairs::keepTouching() {
-  touching_.clear();
+  touching_.swap(dormant_);
+  dormant_.clear();
   for (const NearPair& pair : pairs_) {
     if (pair.touching) touching_.push_back(pair);
   }
 }
 
-// Gives pairs that touched what was remembered of them; a pair is listed under either ball.
+// Gives pairs that touched what was remembered of them; a pair is listed under either ball. What is
+// between balls that stand still is left for when one of them moves.
 void NearPairs::recall() {
-  const auto recallUnder = [this](Slot slot, std::uint32_t partner, const NearPair& old) {
-    if (slot >= moves_.size() || moves_[slot] == 0) return false;
+  const auto moves = [this](std::uint32_t b) { return b < moves_.size() && moves_[b] != 0; };
+  const auto recallUnder = [&](Slot slot, std::uint32_t partner, const NearPair& old) {
     for (std::uint32_t i = first_[slot]; i < behind_[slot]; ++i) {
       if (pairs_[i].b != partner) continue;
       pairs_[i].touching = true;
       pairs_[i].impulse = old.impulse;
-      pairs_[i].approach = old.approach;
+      pairs_[i].reference = old.reference;
       return true;
     }
     return false;
   };
   for (const NearPair& old : touching_) {
-    if (!recallUnder(old.a, old.b, old) && old.b < kFirstWall) recallUnder(old.b, old.a, old);
+    const bool a_moves = moves(old.a);
+    const bool b_moves = moves(old.b);
+    if (!a_moves && !b_moves) {
+      dormant_.push_back(old);
+    } else if (!(a_moves && recallUnder(old.a, old.b, old)) && b_moves) {
+      recallUnder(old.b, old.a, old);
+    }
   }
 }
 
 std::size_t NearPairs::bytes() const {
-  return capacityBytes(pairs_) + capacityBytes(touching_) + capacityBytes(first_) +
-         capacityBytes(behind_) + capacityBytes(moves_) + capacityBytes(cell_begin_) +
-         capacityBytes(members_) + capacityBytes(cells_);
+  return capacityBytes(pairs_) + capacityBytes(touching_) + capacityBytes(dormant_) +
+         capacityBytes(first_) + capacityBytes(behind_) + capacityBytes(moves_) +
+         capacityBytes(cell_begin_) + capacityBytes(members_) + capacityBytes(cells_);
 }
 
 }  // namespace ball_sim::core

@@ -9,6 +9,7 @@
 // costs that much more; meant for ratios up to about 10.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -26,8 +27,8 @@ struct NearPair {
   std::uint32_t b = 0;      ///< another ball, or kFirstWall + index of a wall
   std::uint32_t image = 0;  ///< of b, as seen from a: an index into shifts()
   bool touching = false;    ///< the method's; what it remembers is kept while this is set
-  double impulse = 0;       ///< N s, the method's
-  double approach = 0;      ///< m/s, the method's
+  double impulse = 0;       ///< N s, the method's: what passes in a step, or has passed so far
+  double reference = 0;     ///< the method's: what to compare with later
 };
 
 class NearPairs {
@@ -54,6 +55,16 @@ class NearPairs {
 
   std::vector<NearPair>& pairs() { return pairs_; }
   const std::vector<NearPair>& pairs() const { return pairs_; }
+
+  /// Calls visit(pair) for each pair, those of balls that stopped moving in touch included: these
+  /// are not listed, but remembered. The contact is forgotten when it returns true.
+  template <class Visit>
+  void forgetContactsIf(Visit visit) {
+    for (NearPair& pair : pairs_) {
+      if (visit(pair)) pair.touching = false;
+    }
+    dormant_.erase(std::remove_if(dormant_.begin(), dormant_.end(), visit), dormant_.end());
+  }
 
   const std::vector<Wall<double>>& walls() const { return walls_; }
 
@@ -96,7 +107,8 @@ class NearPairs {
   double skin_ = -1;  // m; below 0: there is no list yet
   double moved_ = 0;  // m, at most, by any ball since the list was made
   std::vector<NearPair> pairs_;
-  std::vector<NearPair> touching_;    // of the list before
+  std::vector<NearPair> touching_;  // of the list before
+  std::vector<NearPair> dormant_;
   std::vector<std::uint32_t> first_;  // of each slot's pairs; one more at the end of movers
   std::vector<std::uint32_t> behind_;
   std::vector<std::uint8_t> moves_;                  // one a slot

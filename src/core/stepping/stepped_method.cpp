@@ -38,6 +38,7 @@ Slot SteppedMethod::takeSlot() {
   ids_.emplace_back();
   masses_.emplace_back();
   changes_.emplace_back();
+  asleep_.emplace_back();
   return static_cast<Slot>(bodies_.size() - 1);
 }
 
@@ -47,6 +48,7 @@ void SteppedMethod::insert(BallId id, const Ball& ball) {
   note(slot, Change::is_new);
   bodies_[slot].radius = ball.radius;
   bodies_[slot].w = 1 / ball.mass;
+  asleep_[slot] = 0;
   masses_[slot] = ball.mass;
   ids_[slot] = id;
   slots_.push_back(slot);
@@ -98,8 +100,10 @@ void SteppedMethod::note(Slot slot, Change change) {
 
 bool SteppedMethod::advanceTo(Time target, std::uint64_t max_events) {
   std::uint64_t events = 0;
-  if (is_changed_) takeUpChanges();
-  while (!movers_.empty() && clock_.isDue(target)) {
+  while (true) {
+    if (is_changed_) takeUpChanges();
+    if (!is_sorted_) sortMovers();
+    if (movers_.empty() || !clock_.isDue(target)) break;
     if (events >= max_events) return false;
     clock_.tick();
     now_ = clock_.last();
@@ -114,20 +118,30 @@ bool SteppedMethod::advanceTo(Time target, std::uint64_t max_events) {
 // After balls were put in, moved or taken out: who moves, and what is near, begins anew.
 void SteppedMethod::takeUpChanges() {
   ballsChanged();
-  for (NearPair& pair : near_.pairs()) {
-    if (isNew(pair.a) || (!isWithWall(pair) && isNew(pair.b))) pair.touching = false;
-  }
+  near_.forgetContactsIf([this](const NearPair& pair) {
+    return isNew(pair.a) || (!isWithWall(pair) && isNew(pair.b));
+  });
   std::fill(changes_.begin(), changes_.end(), Change::none);
   is_changed_ = false;
-  sortMovers();
+  is_sorted_ = false;
+}
+
+void SteppedMethod::setAsleep(Slot slot, bool asleep) {
+  asleep_[slot] = asleep ? 1 : 0;
+  is_sorted_ = false;
 }
 
 void SteppedMethod::sortMovers() {
   movers_.clear();
   still_.clear();
-  for (const Slot slot : slots_) (bodies_[slot].w > 0 ? movers_ : still_).push_back(slot);
+  for (const Slot slot : slots_) {
+    const bool moves = bodies_[slot].w > 0 && !isAsleep(slot);
+    (moves ? movers_ : still_).push_back(slot);
+  }
   std::sort(movers_.begin(), movers_.end());
   near_.invalidate();
+  is_sorted_ = true;
+  moversChanged();
 }
 
 void SteppedMethod::updatePairs(double fastest) {
@@ -179,8 +193,8 @@ Statistics SteppedMethod::statistics() const {
   Statistics statistics = statistics_;
   statistics.bytes = near_.bytes() + capacityBytes(bodies_) + capacityBytes(accelerations_) +
                      capacityBytes(ids_) + capacityBytes(masses_) + capacityBytes(changes_) +
-                     capacityBytes(slots_) + capacityBytes(free_slots_) + capacityBytes(movers_) +
-                     capacityBytes(still_);
+                     capacityBytes(asleep_) + capacityBytes(slots_) + capacityBytes(free_slots_) +
+                     capacityBytes(movers_) + capacityBytes(still_);
   return statistics;
 }
 

@@ -48,8 +48,11 @@ class SteppedMethod : public Method {
   virtual void step() = 0;
 
   /// Told before the next step when balls were put in, pushed, moved or taken out; isNew() and
-  /// isPushed() tell which, and pairs() still are those of the last step.
-  virtual void ballsChanged() = 0;
+  /// isPushed() tell which, and contacts still are those of the last step.
+  virtual void ballsChanged() {}
+
+  /// Told before the next step when movers() are others than in the last one.
+  virtual void moversChanged() {}
 
   bool isNew(Slot slot) const { return changes_[slot] == Change::is_new; }  ///< or gone
   bool isPushed(Slot slot) const { return changes_[slot] == Change::is_pushed; }
@@ -57,6 +60,10 @@ class SteppedMethod : public Method {
   const Surroundings& surroundings() const { return surroundings_; }
   double timeStep() const { return clock_.length(); }  ///< s
   Time stepDate() const { return clock_.last(); }      ///< of the step that is taken
+
+  /// From the next step on a ball stands still, or moves again.
+  void setAsleep(Slot slot, bool asleep);
+  bool isAsleep(Slot slot) const { return asleep_[slot] != 0; }
 
   std::size_t slotCount() const { return bodies_.size(); }     ///< slots are below this
   const std::vector<Slot>& movers() const { return movers_; }  ///< ascending
@@ -109,14 +116,16 @@ class SteppedMethod : public Method {
   std::vector<SteppedBall> bodies_;
   std::vector<Vector3> accelerations_;  // m/s^2, of free flight since the last step
   std::vector<BallId> ids_;
-  std::vector<double> masses_;   // kg
-  std::vector<Change> changes_;  // since the last step
+  std::vector<double> masses_;        // kg
+  std::vector<Change> changes_;       // since the last step
+  std::vector<std::uint8_t> asleep_;  // does not move though it could
 
   std::vector<Slot> slots_;  // of the balls there are, by ascending id
   std::vector<Slot> free_slots_;
   std::vector<Slot> movers_;
   std::vector<Slot> still_;
   bool is_changed_ = false;  // some slot has changed since the last step
+  bool is_sorted_ = true;    // movers_ and still_ are as they should be
   NearPairs near_;
   Statistics statistics_;
   CollisionLog* log_ = nullptr;
