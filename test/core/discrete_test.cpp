@@ -44,7 +44,8 @@ TEST(Discrete, AnElasticGasKeepsEnergyAndMomentumAtAnyStep) {
       // Thousands of impacts round it by an ulp each, at random.
       EXPECT_NEAR(double(kineticEnergyOf(scene, run.states()) / before), 1, 1e-13) << name << dt;
       if (kind.boundary != Boundary::periodic) continue;
-      const auto gained = momentumOf(scene, run.states()) - momentumOf(scene, start.states());
+      const VectorOf<long double> gained =
+          momentumOf(scene, run.states()) - momentumOf(scene, start.states());
       EXPECT_LT(double(gained.norm()), 1e-12 * std::sqrt(double(before))) << name << dt;
     }
   }

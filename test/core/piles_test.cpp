@@ -20,6 +20,15 @@ constexpr double kGravity = 9.81;
 // they give way a little more.
 constexpr double kSag = 2e-3 * kRadius;
 
+// Builds without optimisation, the sanitizers' among them, take a hundred times as long.
+#ifdef __OPTIMIZE__
+constexpr std::size_t kManyBalls = 1000;
+constexpr double kManyBallsWidth = 1.2;  // m, of the box
+#else
+constexpr std::size_t kManyBalls = 60;
+constexpr double kManyBallsWidth = 0.4;
+#endif
+
 MethodSettings millisecond() {
   MethodSettings settings;
   settings.time_step = 1e-3;
