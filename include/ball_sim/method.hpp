@@ -47,6 +47,7 @@ struct Statistics {
   std::uint64_t events = 0;  ///< every event handled: collisions, cell crossings, stale ones, ...
   double virial = 0;         ///< J: sum over ball-ball impacts of impulse times distance of centres
   double deepest_overlap = 0;   ///< m: deepest overlap seen at any impact
+  double elastic_energy = 0;    ///< J: held by the springs of soft contacts now
   std::size_t queue_depth = 0;  ///< events that wait
   std::size_t bytes = 0;        ///< memory held for balls, cells and queue
 };
@@ -101,6 +102,10 @@ class Method {
                                             std::optional<BallId> ignore) const = 0;
 
   virtual Statistics statistics() const = 0;
+
+  /// What the run asked of the method beyond its limits so far, as a sentence that names the limit
+  /// and the remedy; empty: nothing. What is beyond a limit for good makeMethod() refuses.
+  virtual std::string warning() const { return {}; }
 
   /// Reports each impact from now on; nullptr: none. The log must outlive the method or the call
   /// that takes it away.

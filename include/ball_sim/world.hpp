@@ -101,8 +101,9 @@ class World {
   const Surroundings& surroundings() const { return scene_.surroundings; }
   const MethodChoice& method() const { return choice_; }
   Statistics statistics() const { return method_->statistics(); }
+  std::string warning() const { return method_->warning(); }  ///< see Method::warning()
   double kineticEnergy() const;    ///< J
-  double potentialEnergy() const;  ///< J
+  double potentialEnergy() const;  ///< J, of gravity and of soft contacts
   Vector3 momentum() const;        ///< kg m/s
 
   /// Reports impacts into `log` from now on, across resets; nullptr: none.

@@ -1,11 +1,14 @@
 #include "ball_sim/methods.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "ball_sim/brute_force.hpp"
 #include "ball_sim/text.hpp"
+#include "discrete/discrete.hpp"
 #include "event_driven/make_event_driven.hpp"
+#include "soft_sphere/soft_sphere.hpp"
 
 namespace ball_sim::core {
 
@@ -19,7 +22,8 @@ namespace {
 }  // namespace
 
 const std::vector<std::string>& methodNames() {
-  static const std::vector<std::string> names = {"auto", "event_driven", "brute_force"};
+  static const std::vector<std::string> names = {"auto", "event_driven", "discrete", "soft_sphere",
+                                                 "brute_force"};
   return names;
 }
 
@@ -30,9 +34,18 @@ MethodChoice chooseMethod(const std::string& name, const Scene& /*scene*/) {
   return {name, "asked for"};
 }
 
+void checkTimeStep(double time_step) {
+  if (time_step > 0 && std::isfinite(time_step)) return;
+  throw std::invalid_argument("time_step: " + formatNumber(time_step) +
+                              ": must be a finite number of seconds above 0");
+}
+
 std::unique_ptr<Method> makeMethod(const std::string& name, const Surroundings& surroundings,
                                    const MethodSettings& settings) {
+  checkTimeStep(settings.time_step);
   if (name == "event_driven") return makeEventDriven(surroundings, settings.precision);
+  if (name == "discrete") return makeDiscrete(surroundings, settings);
+  if (name == "soft_sphere") return makeSoftSphere(surroundings, settings);
   if (name != "brute_force") refuse(name);
   if (settings.precision == Precision::double_precision) {
     return std::make_unique<BruteForce<double>>(surroundings);

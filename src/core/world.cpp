@@ -10,6 +10,7 @@
 #include "ball_sim/observables.hpp"
 #include "ball_sim/overlap_index.hpp"
 #include "ball_sim/text.hpp"
+#include "soft_sphere/contact_spring.hpp"
 
 namespace ball_sim::core {
 namespace {
@@ -57,10 +58,7 @@ Refusal unknownBall(const std::string& ids, bool several) {
 World::World(const Scene& scene, const WorldOptions& options) : scene_(scene), options_(options) {
   if (!options_.method.empty()) scene_.method = options_.method;
   if (options_.time_step) scene_.time_step = *options_.time_step;
-  if (!(scene_.time_step > 0) || !std::isfinite(scene_.time_step)) {
-    throw std::invalid_argument("time_step: " + formatNumber(scene_.time_step) +
-                                ": must be a finite number of seconds above 0");
-  }
+  checkTimeStep(scene_.time_step);
   choice_ = chooseMethod(scene_.method, scene_);
   std::size_t count = scene_.balls.size();
   for (const Fill& fill : scene_.fill) count += fill.count;
@@ -75,6 +73,9 @@ void World::build(Time start) {
   settings.precision = options_.precision;
   settings.time_step = scene_.time_step;
   settings.tolerance = scene_.tolerance;
+  if (scene_.tolerance) {
+    settings.contact_time = contactTimeFor(*scene_.tolerance, initial_, scene_.surroundings);
+  }
   settings.simultaneous_impacts = scene_.simultaneous_impacts;
   settings.threads = options_.threads;
   std::unique_ptr<Method> method = makeMethod(choice_.name, scene_.surroundings, settings);
@@ -269,7 +270,8 @@ double World::kineticEnergy() const {
 double World::potentialEnergy() const {
   BallStates states;
   read(states);
-  return core::potentialEnergy(states, masses_, surroundings().gravity);
+  return core::potentialEnergy(states, masses_, surroundings().gravity) +
+         statistics().elastic_energy;
 }
 
 Vector3 World::momentum() const {
