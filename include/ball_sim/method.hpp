@@ -49,6 +49,8 @@ struct Statistics {
   double deepest_overlap = 0;   ///< m: deepest overlap seen at any impact
   std::size_t queue_depth = 0;  ///< events that wait
   std::size_t bytes = 0;        ///< memory held for balls, cells and queue
+  /// Impacts at one instant whose outcome the policy (SimultaneousImpacts) decided.
+  std::uint64_t ambiguous_impacts = 0;
 };
 
 /// Moves a set of balls. Inputs are valid by contract: World checks what users give.

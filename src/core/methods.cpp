@@ -35,9 +35,9 @@ std::unique_ptr<Method> makeMethod(const std::string& name, const Surroundings& 
   if (name == "event_driven") return makeEventDriven(surroundings, settings.precision);
   if (name != "brute_force") refuse(name);
   if (settings.precision == Precision::double_precision) {
-    return std::make_unique<BruteForce<double>>(surroundings);
+    return std::make_unique<BruteForce<double>>(surroundings, settings.simultaneous_impacts);
   }
-  return std::make_unique<BruteForce<long double>>(surroundings);
+  return std::make_unique<BruteForce<long double>>(surroundings, settings.simultaneous_impacts);
 }
 
 }  // namespace ball_sim::core
