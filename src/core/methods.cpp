@@ -32,7 +32,7 @@ MethodChoice chooseMethod(const std::string& name, const Scene& /*scene*/) {
 
 std::unique_ptr<Method> makeMethod(const std::string& name, const Surroundings& surroundings,
                                    const MethodSettings& settings) {
-  if (name == "event_driven") return makeEventDriven(surroundings, settings.precision);
+  if (name == "event_driven") return makeEventDriven(surroundings, settings);
   if (name != "brute_force") refuse(name);
   if (settings.precision == Precision::double_precision) {
     return std::make_unique<BruteForce<double>>(surroundings, settings.simultaneous_impacts);

@@ -334,7 +334,7 @@ TEST_P(Policies, randomTouchingClustersConserveAndPart) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Methods, Policies, testing::Values(std::string(kSlowTwin)), methodOf);
+INSTANTIATE_TEST_SUITE_P(Methods, Policies, testing::ValuesIn(exactMethods()), methodOf);
 
 // --- the pure functions
 

@@ -10,7 +10,8 @@
 // Gets right: everything hard and elastic or dissipative, any masses and radii, walls, gravity,
 // at any speed: no impact is missed, none is seen twice. Misses: contact that lasts. A ball comes
 // to rest on walls; a ball on another ball keeps bouncing, ever lower, down to a hum of 1e-6 of
-// their radii. Simultaneous impacts are taken one after the other, by the smaller ids first.
+// their radii. Impacts at one instant are taken one after the other, by the smaller ids first, or
+// together (simultaneous_impacts.hpp).
 // Limits: 2^27 balls; 2^30 cells from the origin of an open scene.
 #pragma once
 
@@ -26,6 +27,8 @@
 #include "ball_sim/collapse_guard.hpp"
 #include "ball_sim/collision_law.hpp"
 #include "ball_sim/method.hpp"
+#include "ball_sim/scene.hpp"
+#include "ball_sim/simultaneous_impacts.hpp"
 #include "ball_sim/time_of_impact.hpp"
 #include "ball_sim/walls.hpp"
 #include "event_driven/cell_grid.hpp"
@@ -43,8 +46,10 @@ class EventDriven final : public Method {
   using Vec = VectorOf<Real>;
 
  public:
-  explicit EventDriven(const Surroundings& surroundings)
+  explicit EventDriven(const Surroundings& surroundings,
+                       SimultaneousImpacts policy = SimultaneousImpacts::sequential)
       : surroundings_(surroundings),
+        policy_(policy),
         gravity_(surroundings.gravity.cast<Real>()),
         restitution_(Real(surroundings.restitution)),
         walls_(wallsOf<Real>(surroundings)) {
@@ -227,6 +232,7 @@ class EventDriven final : public Method {
   };
 
   static constexpr std::uint32_t kWall = 0xF8000000;
+  static constexpr std::uint64_t kWallKey = std::uint64_t{1} << 32;  // beyond all ids of balls
 
   // The ball that another has parted from at this instant.
   struct JustMet {
@@ -489,6 +495,7 @@ class EventDriven final : public Method {
     if (by == 0) return;
     origin_ = origin_ + double(by);
     now_ -= by;
+    watch_.setBack(by);
     for (const Slot slot : slots_) {
       bodies_[slot].time -= by;
       agendas_[slot].impact_time -= by;
@@ -597,6 +604,7 @@ class EventDriven final : public Method {
   }
 
   void meetBall(Slot first, Slot second) {
+    if (policy_ == SimultaneousImpacts::simultaneous && meetTogether(first, second)) return;
     if (agendas_[second].id < agendas_[first].id) std::swap(first, second);
     settle(first);
     settle(second);
@@ -623,6 +631,9 @@ class EventDriven final : public Method {
       ++statistics_.ball_collisions;
       statistics_.virial += double(passed.impulse * reach);
       noteOverlap(reach - dot(dx, n));
+      watch({agendas_[first].id, a.v, inverseMass(first), passed.change1},
+            {agendas_[second].id, b.v, inverseMass(second), passed.change2}, n,
+            passed.approach_speed, reach);
       report(first, agendas_[second].id, n, passed.impulse, passed.approach_speed);
     }
     velocityChanged(first);
@@ -634,6 +645,7 @@ class EventDriven final : public Method {
   }
 
   void meetWall(Slot slot, std::uint32_t index) {
+    if (policy_ == SimultaneousImpacts::simultaneous && meetTogether(slot, kNoSlot)) return;
     settle(slot);
     Body& body = bodies_[slot];
     const Wall<Real>& wall = walls_[index];
@@ -651,10 +663,192 @@ class EventDriven final : public Method {
     }
     if (speed > 0) {
       ++statistics_.wall_collisions;
+      const Vec at_rest = Vec::Zero();
+      watch({agendas_[slot].id, body.v, inverseMass(slot), (1 + e) * speed},
+            {kWallKey + index, at_rest, 0, 0}, -wall.normal, speed, body.radius);
       report(slot, wall.partner, -wall.normal, (1 + e) * speed * Real(agendas_[slot].mass), speed);
     }
     velocityChanged(slot);
     search(slot);
+  }
+
+  void watch(const typename OrderWatch<Real>::Side& a, const typename OrderWatch<Real>::Side& b,
+             const Vec& normal, Real speed, Real reach) {
+    if (watch_.note(now_, a, b, normal, speed, reach, restitution_)) {
+      ++statistics_.ambiguous_impacts;
+    }
+  }
+
+  // --- policy `simultaneous`
+
+  // Balls that touch each other, or through others, at this instant.
+  struct Cluster {
+    std::vector<Slot> members;  // by ascending id
+    std::vector<ClusterBody<Real>> bodies;
+    std::vector<ClusterContact<Real>> contacts;  // by bodies
+  };
+
+  // One round of joint reflections of the cluster around an impact of `slot`, which is not queued.
+  // @param other  the ball it meets, or kNoSlot
+  // @return false: nothing else approaches there, and the impact is one like others
+  bool meetTogether(Slot slot, Slot other) {
+    Cluster cluster = clusterAround(slot, other);
+    keepApproaching(cluster.bodies, cluster.contacts);
+    if (cluster.contacts.size() < 2) return false;
+    if (orderMatters<Real>(cluster.bodies, cluster.contacts, restitution_)) {
+      ++statistics_.ambiguous_impacts;
+    }
+    const Real e = recordImpacts(cluster) ? Real(1) : restitution_;
+    reflectTogether(cluster.bodies, cluster.contacts, e);
+    std::vector<bool> changed(cluster.members.size(), false);
+    for (const ClusterContact<Real>& contact : cluster.contacts) {
+      changed[contact.a] = true;
+      if (!contact.withWall()) changed[contact.b] = true;
+    }
+    const auto forChanged = [&](auto f) {
+      for (std::size_t i = 0; i < changed.size(); ++i) {
+        if (changed[i]) f(cluster.members[i], cluster.bodies[i].v);
+      }
+    };
+    forChanged([&](Slot member, const Vec& v) {
+      settle(member);
+      bodies_[member].v = v;
+      if (member != slot) queue_.remove(member);
+    });
+    for (const ClusterContact<Real>& contact : cluster.contacts) conclude(cluster, contact);
+    forChanged([&](Slot member, const Vec&) { velocityChanged(member); });
+    forChanged([&](Slot member, const Vec&) { search(member); });
+    if (!changed[indexIn(cluster, slot)]) search(slot);
+    return true;
+  }
+
+  static std::size_t indexIn(const Cluster& cluster, Slot slot) {
+    const auto& members = cluster.members;
+    return static_cast<std::size_t>(std::find(members.begin(), members.end(), slot) -
+                                    members.begin());
+  }
+
+  Cluster clusterAround(Slot slot, Slot other) {
+    Cluster cluster;
+    std::vector<Slot>& members = cluster.members;
+    members.push_back(slot);
+    if (other != kNoSlot) members.push_back(other);
+    for (std::size_t k = 0; k < members.size(); ++k) {
+      if (isFixed(members[k])) continue;  // hands nothing on
+      forEachTouching(members[k], [&](Slot touched, const Vec&, Real) {
+        if (indexIn(cluster, touched) == members.size()) members.push_back(touched);
+      });
+    }
+    std::sort(members.begin(), members.end(),
+              [&](Slot a, Slot b) { return agendas_[a].id < agendas_[b].id; });
+    for (const Slot member : members) {
+      cluster.bodies.push_back({velocityNow(member), inverseMass(member)});
+    }
+    for (std::size_t i = 0; i < members.size(); ++i) addContacts(cluster, i);
+    return cluster;
+  }
+
+  // Calls f with each ball that `slot` touches now, the way to it, and the gap.
+  template <class Function>
+  void forEachTouching(Slot slot, Function f) {
+    using std::sqrt;
+    grid_.gatherNear(agendas_[slot].cell, agendas_[slot].level, candidates_);
+    for (std::size_t i = 0; i < candidates_.count; ++i) {
+      const Slot other = candidates_.slots[i];
+      if (other == slot) continue;
+      Vec dx = positionNow(other) - positionNow(slot);
+      if (candidates_.wraps) dx += image_shift_[candidates_.images[i]];
+      const Real reach = bodies_[slot].radius + bodies_[other].radius;
+      const Real gap = sqrt(dot(dx, dx)) - reach;
+      if (touches(gap, reach, std::max(extentOf(slot), extentOf(other)))) f(other, dx, gap);
+    }
+  }
+
+  // What a ball's place was last computed from: where it is, and how far it may have come.
+  Real extentOf(Slot slot) const {
+    const Vec v = velocityNow(slot);
+    return positionNow(slot).cwiseAbs().maxCoeff() + std::sqrt(dot(v, v)) * now_;
+  }
+
+  Vec accelerationOf(Slot slot) const {
+    if constexpr (kGravity) return accelerations_[slot];
+    return Vec::Zero();
+  }
+
+  // Those of member i with walls, and with members after it.
+  void addContacts(Cluster& cluster, std::size_t i) {
+    const Slot slot = cluster.members[i];
+    const Real radius = bodies_[slot].radius;
+    for (std::size_t k = 0; k < walls_.size() && !isFixed(slot); ++k) {
+      const Real gap = dot(positionNow(slot), walls_[k].normal) - walls_[k].offset - radius;
+      if (!touches(gap, radius, extentOf(slot))) continue;
+      ClusterContact<Real> contact;
+      contact.a = i;
+      contact.wall = k;
+      contact.normal = -walls_[k].normal;
+      contact.gap = gap;
+      contact.reach = radius;
+      cluster.contacts.push_back(contact);
+    }
+    forEachTouching(slot, [&](Slot other, const Vec& dx, Real gap) {
+      const std::size_t j = indexIn(cluster, other);
+      if (j <= i || j == cluster.members.size() || (isFixed(slot) && isFixed(other))) return;
+      ClusterContact<Real> contact;
+      contact.a = i;
+      contact.b = j;
+      contact.normal = contactNormal<Real>(dx);
+      contact.gap = gap;
+      contact.reach = radius + bodies_[other].radius;
+      const Vec pressing = accelerationOf(slot) - accelerationOf(other);
+      contact.least_rebound = leastRebound<Real>(dot(pressing, contact.normal), contact.reach);
+      cluster.contacts.push_back(contact);
+    });
+  }
+
+  // Tells the guard against collapse, once a ball, by its fastest contact. @return whether any ball
+  // is in a collapse
+  bool recordImpacts(const Cluster& cluster) {
+    if (!(restitution_ < 1)) return false;
+    bool collapses = false;
+    for (std::size_t i = 0; i < cluster.members.size(); ++i) {
+      const Slot slot = cluster.members[i];
+      Real speed = 0;
+      Real reach = 0;
+      for (const ClusterContact<Real>& contact : cluster.contacts) {
+        if (contact.a != i && contact.b != i) continue;
+        if (contact.withWall() && dot(accelerationOf(slot), contact.normal) > 0) continue;
+        if (contact.approach_speed > speed) {
+          speed = contact.approach_speed;
+          reach = contact.reach;
+        }
+      }
+      if (speed > 0 && histories_[slot].record(now_, speed, reach)) collapses = true;
+    }
+    return collapses;
+  }
+
+  // Counts and reports a contact after its impact.
+  void conclude(const Cluster& cluster, const ClusterContact<Real>& contact) {
+    if (!(contact.impulse > 0)) return;
+    const Slot slot = cluster.members[contact.a];
+    noteOverlap(-contact.gap);
+    if (!contact.withWall()) {
+      ++statistics_.ball_collisions;
+      statistics_.virial += double(contact.impulse * contact.reach);
+      report(slot, agendas_[cluster.members[contact.b]].id, contact.normal, contact.impulse,
+             contact.approach_speed);
+      return;
+    }
+    const Wall<Real>& wall = walls_[contact.wall];
+    if constexpr (kGravity) {
+      const Body& body = bodies_[slot];
+      const Real pull = dot(accelerations_[slot], wall.normal);
+      if (comesToRest<Real>(dot(body.v, wall.normal), pull, body.radius)) {
+        resting_[slot].add(static_cast<int>(contact.wall));
+      }
+    }
+    ++statistics_.wall_collisions;
+    report(slot, wall.partner, contact.normal, contact.impulse, contact.approach_speed);
   }
 
   // After any change of velocity: events found with the old one are stale; walls rested on are
@@ -890,6 +1084,7 @@ class EventDriven final : public Method {
   static constexpr std::int32_t kFarthestCell = 1 << 30;
 
   Surroundings surroundings_;
+  SimultaneousImpacts policy_;
   Vec gravity_;
   Real restitution_;
   std::vector<Wall<Real>> walls_;
@@ -922,6 +1117,7 @@ class EventDriven final : public Method {
   Real now_ = 0;  // s, in this year
   Time reached_;  // what now() tells
   std::uint64_t events_at_new_year_ = 0;
+  OrderWatch<Real> watch_;
   Statistics statistics_;
   CollisionLog* log_ = nullptr;
 };
