@@ -1,7 +1,10 @@
 #include "simulator.hpp"
 
+#include <ros/console.h>
+
 #include <algorithm>
 
+#include "ball_sim/warnings.hpp"
 #include "conversions.hpp"
 
 namespace ball_sim {
@@ -221,6 +224,7 @@ void Simulator::publishFrame(bool frame_ended) {
   }
   if (stats_due_.due(wall)) {
     outputs_.publishStats(stats(wall));
+    warnOnce();
   }
   if (repeat_due_.due(wall)) {
     outputs_.repeatLatched();
@@ -238,6 +242,17 @@ void Simulator::listen() {
   if (outputs_.wantsCollisions() != listening_) {
     listening_ = !listening_;
     world_.setCollisionLog(listening_ ? &collisions_ : nullptr);
+  }
+}
+
+void Simulator::warnOnce() {
+  if (warned_) {
+    return;
+  }
+  const std::string warning = core::policyWarning(world_);
+  if (!warning.empty()) {
+    ROS_WARN_STREAM(warning);
+    warned_ = true;
   }
 }
 

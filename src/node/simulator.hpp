@@ -98,6 +98,7 @@ class Simulator {
   void publishFrame(bool frame_ended);
   void publishStates();
   void listen();
+  void warnOnce();
   SimStats stats(Clock::time_point wall);
   double energy() const { return world_.kineticEnergy() + world_.potentialEnergy(); }
 
@@ -129,6 +130,7 @@ class Simulator {
   bool moved_ = true;       // since the markers before
   bool changed_ = true;     // from outside
   bool population_ = true;  // changed from outside
+  bool warned_ = false;     // of impacts that the policy decided
 
   // For ~stats.
   double reference_energy_ = 0;  // J, after the last change from outside
