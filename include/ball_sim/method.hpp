@@ -64,6 +64,9 @@ class Method {
   /// The method's name as scenes spell it.
   virtual const char* name() const = 0;
 
+  /// Why it is this one that moves the balls.
+  virtual std::string reason() const { return "asked for"; }
+
   /// Adds a ball at the present instant.
   /// @param id    not in use, and larger than all ids before it
   /// @param ball  finite, overlaps none, within the surroundings; in a periodic box anywhere

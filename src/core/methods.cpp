@@ -23,11 +23,9 @@ const std::vector<std::string>& methodNames() {
   return names;
 }
 
-MethodChoice chooseMethod(const std::string& name, const Scene& /*scene*/) {
-  if (name == "auto") return {"event_driven", "exact to rounding, and fast at any density"};
+void checkMethodName(const std::string& name) {
   const auto& names = methodNames();
   if (std::find(names.begin(), names.end(), name) == names.end()) refuse(name);
-  return {name, "asked for"};
 }
 
 std::unique_ptr<Method> makeMethod(const std::string& name, const Surroundings& surroundings,
