@@ -10,8 +10,9 @@
 namespace ball_sim::core {
 namespace {
 
-// A look costs a pass over all balls: seldom enough to cost a percent.
-constexpr std::uint64_t kEventsPerLook = 4096;
+// A look costs a pass over all balls: seldom enough to cost a percent. Where impacts come one by
+// one, few of them say nothing.
+constexpr std::uint64_t kFewestImpacts = 4096;
 constexpr std::uint64_t kEventsPerBallAndLook = 16;
 
 // Of a hum at 1e-6 of the sum of radii a ball has hundreds of impacts in the time it takes to fall
@@ -106,7 +107,8 @@ void AutoMethod::startWindow() {
 }
 
 std::uint64_t AutoMethod::eventsToLook() const {
-  const std::uint64_t length = kEventsPerLook + kEventsPerBallAndLook * balls_.size();
+  const std::uint64_t length =
+      kEventsPerBallAndLook * balls_.size() + (stepping_ ? 1 : kFewestImpacts);
   const std::uint64_t passed = method_->statistics().events - window_events_;
   return passed < length ? length - passed : 0;
 }
