@@ -397,6 +397,13 @@ TEST(OrderWatch, seesThatBothApproachedAtOnce) {
   EXPECT_FALSE(rested(1));
   EXPECT_FALSE(first(2));
   EXPECT_FALSE(comes(2 + 1e-9)) << "later is another instant";
+  // The same with the partners of the first impact named the other way round.
+  EXPECT_FALSE(
+      watch.note(2.5, {1, at[1], 0.5, 2.0 / 3}, {0, at[0], 1, 4.0 / 3}, Vector3(-x), 1, 1, 1));
+  EXPECT_TRUE(comes(2.5));
+  EXPECT_FALSE(
+      watch.note(2.7, {1, at[1], 0.5, 2.0 / 3}, {0, at[0], 1, 4.0 / 3}, Vector3(-x), 1, 1, 1));
+  EXPECT_FALSE(rested(2.7));
   EXPECT_FALSE(first(3));
   watch.setBack(1);
   EXPECT_FALSE(comes(3)) << "so is the same reading of a clock that was set back";
