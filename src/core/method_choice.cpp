@@ -67,13 +67,16 @@ double moment(const std::vector<SizeClass>& classes, double volume, int power, b
 }
 
 // Points of ln(mean free path / diameter) against bits per collision, and straight lines between
-// and beyond them.
+// them and below. Above, in a gas, a collision multiplies an angle by the free path in diameters.
 struct ChaosPoint {
   double log_path;
   double bits;
 };
 
 double interpolate(const std::vector<ChaosPoint>& points, double log_path) {
+  if (log_path > points.back().log_path) {
+    return points.back().bits + (log_path - points.back().log_path) / std::log(2.0);
+  }
   std::size_t k = 1;
   while (k + 1 < points.size() && log_path > points[k].log_path) ++k;
   const ChaosPoint& low = points[k - 1];
