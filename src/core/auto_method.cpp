@@ -191,7 +191,8 @@ void AutoMethod::judgeExact(const Look& look) {
   const double step = steppingStep();
   changeTo("discrete", formatShort(look.event_rate) +
                            " events per ball and second where balls lie on balls; steps of " +
-                           formatShort(step) + " s until they are stirred");
+                           formatShort(step) + " s until they are stirred" +
+                           (settings_.tolerance ? "" : ", exact no longer"));
   // What resting contacts hold in overlap, and what a step of free fall is off by.
   double weight = 0;  // N
   for (const Properties& ball : balls_) weight += std::isinf(ball.mass) ? 0 : gravity_ * ball.mass;
