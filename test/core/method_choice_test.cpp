@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -175,7 +176,7 @@ const std::vector<std::string> kToday = {"auto", "event_driven", "brute_force"};
 TEST(Choice, tellsItsNumbers) {
   SceneNumbers numbers;
   numbers.balls = 1000;
-  numbers.collision_rate = 3.1;
+  numbers.collision_rate = numbers.highest_rate = 3.1;
   numbers.mean_radius = 0.1;
   numbers.mean_speed = 1;
   numbers.volume = 10;
@@ -187,6 +188,64 @@ TEST(Choice, tellsItsNumbers) {
   // log2(1e-2 / 2e-15) / 1.1 / 3.1 = 12.4 s.
   EXPECT_EQ(chooseFor(numbers, std::nullopt, kToday).reason,
             "3.1 collisions per ball and second, horizon 12 s at 0.01");
+}
+
+TEST(Choice, ofMixedSizesTheHorizonIsThatOfTheLarge) {
+  Scene scene = polydisperse(false);
+  const std::vector<Ball> balls = populate(scene);
+  const SceneNumbers mixed = sceneNumbers(scene.surroundings, balls);
+  // Radii 1:3 about 2: with reach squared, (3 + 2)^2 / (2 + 2)^2 = 1.6 and a little for contact.
+  EXPECT_GT(mixed.highest_rate / mixed.collision_rate, 1.4);
+  EXPECT_LT(mixed.highest_rate / mixed.collision_rate, 2);
+  EXPECT_NEAR(horizonInSeconds(mixed, 1e-6),
+              horizonInCollisions(mixed.bits_per_collision, 1e-6) / mixed.highest_rate, 1e-12);
+  EXPECT_EQ(horizonInSeconds(SceneNumbers(), 1e-6), std::numeric_limits<double>::infinity());
+}
+
+TEST(SceneNumbers, countWhatFallingGives) {
+  Surroundings around = floorUnderGravity(10, 1);
+  std::vector<Ball> balls;
+  for (int i = 0; i < 64; ++i) {
+    const Vector3 place(i % 4, i / 4 % 4, 1.1 + i / 16);
+    balls.push_back({place, Vector3(i % 2 == 0 ? 3 : -3, 0, 0), 0.1, 1});
+  }
+  // Falls of 1, 2, 3 and 4 m: g h on average, 25 m^2/s^2, beside 9.
+  const SceneNumbers falling = sceneNumbers(around, balls);
+  EXPECT_FALSE(falling.settles);
+  EXPECT_NEAR(falling.mean_speed, std::sqrt(9 + 25), 1e-12);
+  around.gravity = Vector3::Zero();
+  const SceneNumbers flying = sceneNumbers(around, balls);
+  EXPECT_NEAR(flying.mean_speed, 3, 1e-12);
+  EXPECT_NEAR(falling.collision_rate / flying.collision_rate, std::sqrt(34.0 / 9), 1e-12);
+  around.gravity = Vector3(0, 0, 10);  // away from the floor, for ever
+  EXPECT_NEAR(sceneNumbers(around, balls).mean_speed, 3, 1e-12);
+  around = floorUnderGravity(10, 0.5);
+  EXPECT_TRUE(sceneNumbers(around, balls).settles);
+  EXPECT_NE(chooseFor(sceneNumbers(around, balls), 1e-6, kToday).reason.find("come to rest"),
+            std::string::npos);
+}
+
+// Measured by bench/auto_benchmark: continuous is the cheaper of many balls in a thin gas, and
+// nowhere else.
+TEST(Choice, takesTheCheaperExactMethod) {
+  const std::vector<std::string> both = {"auto", "event_driven", "continuous", "discrete"};
+  const auto choiceFor = [&](double count, double packing_fraction) {
+    SceneNumbers numbers;
+    numbers.balls = static_cast<std::size_t>(count);
+    numbers.mean_radius = 0.05;
+    numbers.packing_fraction = packing_fraction;
+    numbers.volume = count * 4 * kPi / 3 * std::pow(0.05, 3) / packing_fraction;
+    numbers.mean_speed = std::sqrt(8 / kPi);
+    const double chi = (1 - packing_fraction / 2) / std::pow(1 - packing_fraction, 3);
+    numbers.collision_rate = numbers.highest_rate =
+        4 * 0.01 * count / numbers.volume * chi * std::sqrt(kPi);
+    numbers.bits_per_collision = 1;
+    return chooseFor(numbers, 1e-6, both);
+  };
+  EXPECT_EQ(choiceFor(1e3, 0.001).name, "event_driven");
+  EXPECT_EQ(choiceFor(1e5, 0.45).name, "event_driven");
+  EXPECT_EQ(choiceFor(1e5, 0.001).name, "continuous");
+  EXPECT_NE(choiceFor(1e5, 0.001).reason.find("of the cost of event_driven"), std::string::npos);
 }
 
 TEST(Choice, takesWhatIsThereAndExact) {
