@@ -2,11 +2,11 @@
 // keeps the scene's tolerance. The aim: never more than 1.3 times the cheapest, and never a method
 // that does not keep it.
 //
-// usage: auto_benchmark [SCENE.yaml ...]
-// Without arguments: scenes made here, of every kind that the choice is about. Each method that
-// keeps the tolerance runs a scene for the same simulated time, in turns, three times; the median
-// counts. Set-up and a first tenth are not counted. A method that needs more than 10 s of CPU time
-// is given up.
+// usage: auto_benchmark [SCENE.yaml ...] [WORD]
+// Without scenes: those made here, of every kind that the choice is about, or those of them with
+// WORD in their names. Each method that keeps the tolerance runs a scene for the same simulated
+// time, in turns, three times; the median counts. Set-up and a first tenth are not counted. A method
+// that needs more than 10 s of CPU time is given up.
 //
 // What keeps a tolerance: places below the horizon of chaos are within it of those of event_driven
 // in long double. A scene in which balls come to lie on balls has no such places; there it is the
@@ -315,14 +315,23 @@ double runCase(Case test) {
   return own.cpu && own.keeps ? *own.cpu / least : std::numeric_limits<double>::infinity();
 }
 
-int run(const std::vector<std::string>& files) {
+int run(const std::vector<std::string>& arguments) {
   std::vector<Case> cases;
-  for (const std::string& file : files) cases.push_back(fromFile(file));
-  if (files.empty()) cases = ownCases();
+  std::string word;
+  for (const std::string& argument : arguments) {
+    if (argument.find(".yaml") == std::string::npos) {
+      word = argument;
+    } else {
+      cases.push_back(fromFile(argument));
+    }
+  }
+  if (cases.empty()) cases = ownCases();
   std::printf("%-28s %-13s %10s %9s %9s  %s %s\n", "scene", "method", "CPU s/s", "error/r",
               "overlap/r", "keeps", "auto/cheapest");
   double worst = 0;
-  for (const Case& test : cases) worst = std::max(worst, runCase(test));
+  for (const Case& test : cases) {
+    if (test.scene.name.find(word) != std::string::npos) worst = std::max(worst, runCase(test));
+  }
   std::printf("worst: %.2f times the cheapest that keeps the tolerance\n", worst);
   return 0;
 }
