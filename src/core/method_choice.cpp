@@ -42,29 +42,32 @@ Vector3 commonVelocity(const std::vector<Ball>& balls) {
   return mass > 0 ? Vector3(momentum / mass) : Vector3(Vector3::Zero());
 }
 
+// Classes a tenth apart, or more where the sizes span more than a factor of 600.
 std::vector<SizeClass> classesOf(const std::vector<Ball>& balls, bool fixed, const Vector3& common,
                                  int dimension) {
-  constexpr std::size_t kMostClasses = 32;
-  std::vector<const Ball*> sorted;
+  double smallest = std::numeric_limits<double>::infinity();
+  double largest = 0;
   for (const Ball& ball : balls) {
-    if (std::isinf(ball.mass) == fixed) sorted.push_back(&ball);
+    smallest = std::min(smallest, ball.radius);
+    largest = std::max(largest, ball.radius);
   }
-  std::sort(sorted.begin(), sorted.end(),
-            [](const Ball* a, const Ball* b) { return a->radius < b->radius; });
-  const std::size_t number = std::min(kMostClasses, sorted.size());
-  std::vector<SizeClass> classes;
-  for (std::size_t k = 0; k < number; ++k) {
-    const std::size_t begin = k * sorted.size() / number;
-    const std::size_t end = (k + 1) * sorted.size() / number;
-    SizeClass size;
+  const double width = std::max(0.1, std::log(largest / smallest) / 63);
+  std::vector<SizeClass> classes(64);
+  for (const Ball& ball : balls) {
+    if (std::isinf(ball.mass) != fixed) continue;
+    SizeClass& size = classes[static_cast<std::size_t>(std::log(ball.radius / smallest) / width)];
+    const Vector3 v = fixed ? Vector3(Vector3::Zero()) : Vector3(ball.velocity - common);
     size.fixed = fixed;
-    size.count = static_cast<double>(end - begin);
-    for (std::size_t i = begin; i < end; ++i) {
-      const Vector3 v = fixed ? Vector3(Vector3::Zero()) : Vector3(sorted[i]->velocity - common);
-      size.radius += sorted[i]->radius / size.count;
-      size.speed2 += dot(v, v) / (dimension * size.count);
-    }
-    classes.push_back(size);
+    size.count += 1;
+    size.radius += ball.radius;
+    size.speed2 += dot(v, v) / dimension;
+  }
+  classes.erase(std::remove_if(classes.begin(), classes.end(),
+                               [](const SizeClass& size) { return size.count == 0; }),
+                classes.end());
+  for (SizeClass& size : classes) {
+    size.radius /= size.count;
+    size.speed2 /= size.count;
   }
   return classes;
 }
