@@ -200,33 +200,6 @@ Scene stack() {
   return scene;
 }
 
-std::vector<Case> ownCases() {
-  const Range one = {0.05, 0.05};
-  std::vector<Case> cases;
-  for (const std::size_t count : {1000u, 10000u, 100000u}) {
-    const double share = 1000.0 / static_cast<double>(count);
-    cases.push_back({fluid(false, count, 0.001, one), 100 * share, false});
-    cases.push_back({fluid(false, count, 0.05, one), 20 * share, false});
-    cases.push_back({fluid(false, count, 0.2, one), 10 * share, false});
-    cases.push_back({fluid(false, count, 0.45, one), 2 * share, false});
-    cases.push_back({fluid(true, count, 0.2, one), 20 * share, false});
-    cases.push_back({fluid(true, count, 0.6, one), 4 * share, false});
-  }
-  cases.push_back({chain("pi billiard, k = 3", {1, 1e6}, 1, 1), 10, false});
-  cases.push_back({chain("cradle with gaps", {1, 1, 1, 1, 1}, 0.1, 1), 10, false});
-  cases.push_back({twelveDiscs(), 10, false});
-  cases.push_back({fluid(false, 100, 0.105, one), 20, false});
-  cases.push_back({fluid(false, 100, 0.471, one), 5, false});
-  cases.push_back({bullet(), 0.2, false});
-  cases.push_back({fluid(false, 5000, 0.2, {0.05, 0.15}), 2, false});
-  cases.push_back({fluid(false, 5000, 0.2, {0.01, 0.1}), 1, false});
-  cases.push_back({bouncing(), 2, false});
-  cases.push_back({poured(300, 0.5), 10, true});
-  cases.push_back({poured(300, 0.9), 10, true});
-  cases.push_back({stack(), 20, true});
-  return cases;
-}
-
 // Balls in a row along x, radius 0.5, with gaps.
 Scene chain(const std::string& name, const std::vector<double>& masses, double gap, double speed) {
   Scene scene;
@@ -252,6 +225,33 @@ Scene bullet() {
   scene.balls = {{Vector3::Zero(), Vector3(1000, 0, 0), 0.01, 0.1}};
   scene.name = "bullet of 1 km/s into a gas";
   return scene;
+}
+
+std::vector<Case> ownCases() {
+  const Range one = {0.05, 0.05};
+  std::vector<Case> cases;
+  for (const std::size_t count : {1000u, 10000u, 100000u}) {
+    const double share = 1000.0 / static_cast<double>(count);
+    cases.push_back({fluid(false, count, 0.001, one), 100 * share, false});
+    cases.push_back({fluid(false, count, 0.05, one), 20 * share, false});
+    cases.push_back({fluid(false, count, 0.2, one), 10 * share, false});
+    cases.push_back({fluid(false, count, 0.45, one), 2 * share, false});
+    cases.push_back({fluid(true, count, 0.2, one), 20 * share, false});
+    cases.push_back({fluid(true, count, 0.6, one), 4 * share, false});
+  }
+  cases.push_back({chain("pi billiard, k = 3", {1, 1e6}, 1, 1), 10, false});
+  cases.push_back({chain("cradle with gaps", {1, 1, 1, 1, 1}, 0.1, 1), 10, false});
+  cases.push_back({twelveDiscs(), 10, false});
+  cases.push_back({fluid(false, 100, 0.105, one), 20, false});
+  cases.push_back({fluid(false, 100, 0.471, one), 5, false});
+  cases.push_back({bullet(), 0.2, false});
+  cases.push_back({fluid(false, 5000, 0.2, {0.05, 0.15}), 2, false});
+  cases.push_back({fluid(false, 5000, 0.2, {0.01, 0.1}), 1, false});
+  cases.push_back({bouncing(), 2, false});
+  cases.push_back({poured(300, 0.5), 10, true});
+  cases.push_back({poured(300, 0.9), 10, true});
+  cases.push_back({stack(), 20, true});
+  return cases;
 }
 
 Case fromFile(const std::string& path) {
