@@ -50,6 +50,8 @@ struct Statistics {
   double elastic_energy = 0;    ///< J: held by the springs of soft contacts now
   std::size_t queue_depth = 0;  ///< events that wait
   std::size_t bytes = 0;        ///< memory held for balls, cells and queue
+  /// Impacts at one instant whose outcome the policy (SimultaneousImpacts) decided.
+  std::uint64_t ambiguous_impacts = 0;
 };
 
 /// Moves a set of balls. Inputs are valid by contract: World checks what users give.
@@ -62,6 +64,9 @@ class Method {
 
   /// The method's name as scenes spell it.
   virtual const char* name() const = 0;
+
+  /// Why it is this one that moves the balls.
+  virtual std::string reason() const { return "asked for"; }
 
   /// Adds a ball at the present instant.
   /// @param id    not in use, and larger than all ids before it

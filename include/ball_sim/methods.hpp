@@ -34,9 +34,13 @@ struct MethodChoice {
 /// The names a scene may use, `auto` first.
 const std::vector<std::string>& methodNames();
 
-/// Settles `auto`; any other name is taken as it is.
 /// @throws std::invalid_argument  an unknown name, listing the known ones
-MethodChoice chooseMethod(const std::string& name, const Scene& scene);
+void checkMethodName(const std::string& name);
+
+/// Settles `auto`; any other known name is taken as it is.
+/// @param balls  all balls of the scene, those that fill it too
+MethodChoice chooseMethod(const std::string& name, const Scene& scene,
+                          const std::vector<Ball>& balls);
 
 /// @throws std::invalid_argument  a time step, s, that is not finite or not above 0
 void checkTimeStep(double time_step);

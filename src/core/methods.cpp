@@ -27,11 +27,9 @@ const std::vector<std::string>& methodNames() {
   return names;
 }
 
-MethodChoice chooseMethod(const std::string& name, const Scene& /*scene*/) {
-  if (name == "auto") return {"event_driven", "exact to rounding, and fast at any density"};
+void checkMethodName(const std::string& name) {
   const auto& names = methodNames();
   if (std::find(names.begin(), names.end(), name) == names.end()) refuse(name);
-  return {name, "asked for"};
 }
 
 void checkTimeStep(double time_step) {
@@ -43,14 +41,14 @@ void checkTimeStep(double time_step) {
 std::unique_ptr<Method> makeMethod(const std::string& name, const Surroundings& surroundings,
                                    const MethodSettings& settings) {
   checkTimeStep(settings.time_step);
-  if (name == "event_driven") return makeEventDriven(surroundings, settings.precision);
+  if (name == "event_driven") return makeEventDriven(surroundings, settings);
   if (name == "discrete") return makeDiscrete(surroundings, settings);
   if (name == "soft_sphere") return makeSoftSphere(surroundings, settings);
   if (name != "brute_force") refuse(name);
   if (settings.precision == Precision::double_precision) {
-    return std::make_unique<BruteForce<double>>(surroundings);
+    return std::make_unique<BruteForce<double>>(surroundings, settings.simultaneous_impacts);
   }
-  return std::make_unique<BruteForce<long double>>(surroundings);
+  return std::make_unique<BruteForce<long double>>(surroundings, settings.simultaneous_impacts);
 }
 
 }  // namespace ball_sim::core

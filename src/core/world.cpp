@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ball_sim/auto_method.hpp"
 #include "ball_sim/ball_check.hpp"
 #include "ball_sim/fill.hpp"
 #include "ball_sim/limits.hpp"
@@ -59,12 +60,13 @@ World::World(const Scene& scene, const WorldOptions& options) : scene_(scene), o
   if (!options_.method.empty()) scene_.method = options_.method;
   if (options_.time_step) scene_.time_step = *options_.time_step;
   checkTimeStep(scene_.time_step);
-  choice_ = chooseMethod(scene_.method, scene_);
+  checkMethodName(scene_.method);
   std::size_t count = scene_.balls.size();
   for (const Fill& fill : scene_.fill) count += fill.count;
   if (count > options_.max_balls) throw Refused(ballLimit(0, count, options_.max_balls));
   initial_ = populate(scene_);
   checkInitial(initial_, scene_.surroundings);
+  choice_ = chooseMethod(scene_.method, scene_, initial_);
   build(Time());
 }
 
@@ -78,7 +80,12 @@ void World::build(Time start) {
   }
   settings.simultaneous_impacts = scene_.simultaneous_impacts;
   settings.threads = options_.threads;
-  std::unique_ptr<Method> method = makeMethod(choice_.name, scene_.surroundings, settings);
+  std::unique_ptr<Method> method;
+  if (scene_.method == "auto") {
+    method = std::make_unique<AutoMethod>(scene_.surroundings, settings, choice_);
+  } else {
+    method = makeMethod(choice_.name, scene_.surroundings, settings);
+  }
   method->advanceTo(start);
   method_ = std::move(method);
   method_->setCollisionLog(log_);

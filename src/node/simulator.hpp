@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <string>
 
 #include "ball_sim/world.hpp"
 #include "command_queue.hpp"
@@ -98,6 +99,7 @@ class Simulator {
   void publishFrame(bool frame_ended);
   void publishStates();
   void listen();
+  void tellNews();
   SimStats stats(Clock::time_point wall);
   double energy() const { return world_.kineticEnergy() + world_.potentialEnergy(); }
 
@@ -129,6 +131,8 @@ class Simulator {
   bool moved_ = true;       // since the markers before
   bool changed_ = true;     // from outside
   bool population_ = true;  // changed from outside
+  std::string method_;      // the one last told of
+  bool warned_ = false;     // of impacts that the policy decided
 
   // For ~stats.
   double reference_energy_ = 0;  // J, after the last change from outside

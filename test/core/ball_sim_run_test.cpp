@@ -4,6 +4,7 @@
 #include <unistd.h>
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -143,6 +144,24 @@ TEST_F(BallSimRun, WritesStatistics) {
   EXPECT_GT(stats["bytes_per_ball"].as<double>(), 0);
   EXPECT_EQ(stats["state_hash"].as<std::string>().size(), 16u);
   EXPECT_TRUE(stats["error"].IsNull());
+}
+
+TEST_F(BallSimRun, WarnsOnceWhereThePolicyDecides) {
+  const auto row = [&](const std::string& name, int mass) {
+    return write(name,
+                 "balls:\n"
+                 "  - {position: [0, 0, 0], velocity: [1, 0, 0], radius: 0.5, mass: 1}\n"
+                 "  - {position: [1, 0, 0], radius: 0.5, mass: " +
+                     std::to_string(mass) +
+                     "}\n"
+                     "  - {position: [2, 0, 0], velocity: [-1, 0, 0], radius: 0.5, mass: 1}\n");
+  };
+  ASSERT_EQ(run(row("open.yaml", 2) + " --until 1 --stats " + file("s.json")), 0) << err_;
+  EXPECT_NE(err_.find("simultaneous_impacts is sequential"), std::string::npos) << err_;
+  EXPECT_EQ(std::count(err_.begin(), err_.end(), '\n'), 1) << err_;
+  EXPECT_GT(YAML::LoadFile(file("s.json"))["ambiguous_impacts"].as<int>(), 0);
+  ASSERT_EQ(run(row("settled.yaml", 1) + " --until 1"), 0) << err_;
+  EXPECT_EQ(err_, "") << "equal balls in a row need no policy";
 }
 
 TEST_F(BallSimRun, MeasuresCompressibility) {

@@ -13,7 +13,8 @@
 // Gets right: everything hard and elastic or dissipative, any masses and radii, walls, gravity,
 // at any speed: no impact is missed, none is seen twice. Misses: contact that lasts. A ball comes
 // to rest on walls; a ball on another ball keeps bouncing, ever lower, down to a hum of 1e-6 of
-// their radii. Simultaneous impacts are taken one after the other, by the smaller ids first.
+// their radii. Impacts at one instant are taken one after the other, by the smaller ids first, or
+// together (simultaneous_impacts.hpp).
 // Limits: 2^27 balls; 2^30 cells from the origin of an open scene.
 #pragma once
 
@@ -29,6 +30,8 @@
 #include "ball_sim/collapse_guard.hpp"
 #include "ball_sim/collision_law.hpp"
 #include "ball_sim/method.hpp"
+#include "ball_sim/scene.hpp"
+#include "ball_sim/simultaneous_impacts.hpp"
 #include "ball_sim/time_of_impact.hpp"
 #include "ball_sim/walls.hpp"
 #include "event_driven/cell_grid.hpp"
@@ -48,8 +51,10 @@ class EventDriven final : public Method {
   using Vec = VectorOf<Real>;
 
  public:
-  explicit EventDriven(const Surroundings& surroundings)
+  explicit EventDriven(const Surroundings& surroundings,
+                       SimultaneousImpacts policy = SimultaneousImpacts::sequential)
       : surroundings_(surroundings),
+        policy_(policy),
         restitution_(Real(surroundings.restitution)),
         walls_(wallsOf<Real>(surroundings)),
         contacts_(surroundings.gravity.cast<Real>()),
@@ -197,6 +202,7 @@ class EventDriven final : public Method {
 
  private:
   static constexpr std::uint32_t kWall = 0xF8000000;
+  static constexpr std::uint64_t kWallKey = std::uint64_t{1} << 32;  // beyond all ids of balls
 
   // The ball that another has parted from at this instant.
   struct JustMet {
@@ -501,6 +507,7 @@ class EventDriven final : public Method {
     if (by == 0) return;
     origin_ = origin_ + double(by);
     now_ -= by;
+    watch_.setBack(by);
     for (const Slot slot : slots_) {
       bodies_[slot].time -= by;
       agendas_[slot].impact_time -= by;
@@ -655,7 +662,7 @@ class EventDriven final : public Method {
     Found found{agenda.impact_time, agenda.partner};
     grid_.gatherNewLayer(before, unwrapped, agenda.cell, agenda.level, agenda.crossing_axis,
                          candidates_);
-    considerBalls(seekerAt(slot, {}), candidates_.slots.data(), candidates_.count, found);
+    considerBalls(seekerAt(slot, {}), {candidates_.slots.data(), candidates_.count}, found);
     considerWallsOf(slot, found);
     if (found.time < agenda.impact_time) setImpact(slot, found);
     findCrossing(slot);
@@ -682,6 +689,7 @@ class EventDriven final : public Method {
   }
 
   void meetBall(Slot first, Slot second) {
+    if (policy_ == SimultaneousImpacts::simultaneous && meetTogether(first, second)) return;
     if (agendas_[second].id < agendas_[first].id) std::swap(first, second);
     settle(first);
     settle(second);
@@ -708,6 +716,9 @@ class EventDriven final : public Method {
       ++statistics_.ball_collisions;
       statistics_.virial += double(passed.impulse * reach);
       noteOverlap(reach - dot(dx, n));
+      watch({agendas_[first].id, a.v, inverseMass(first), passed.change1},
+            {agendas_[second].id, b.v, inverseMass(second), passed.change2}, n,
+            passed.approach_speed, reach);
       report(first, agendas_[second].id, n, passed.impulse, passed.approach_speed);
     }
     velocityChanged(first);
@@ -719,6 +730,7 @@ class EventDriven final : public Method {
   }
 
   void meetWall(Slot slot, std::uint32_t index) {
+    if (policy_ == SimultaneousImpacts::simultaneous && meetTogether(slot, kNoSlot)) return;
     settle(slot);
     Body<Real>& body = bodies_[slot];
     const Wall<Real>& wall = walls_[index];
@@ -736,10 +748,195 @@ class EventDriven final : public Method {
     }
     if (speed > 0) {
       ++statistics_.wall_collisions;
+      const Vec at_rest = Vec::Zero();
+      watch({agendas_[slot].id, body.v, inverseMass(slot), (1 + e) * speed},
+            {kWallKey + index, at_rest, 0, 0}, -wall.normal, speed, body.radius);
       report(slot, wall.partner, -wall.normal, (1 + e) * speed * Real(agendas_[slot].mass), speed);
     }
     velocityChanged(slot);
     search(slot);
+  }
+
+  void watch(const typename OrderWatch<Real>::Side& a, const typename OrderWatch<Real>::Side& b,
+             const Vec& normal, Real speed, Real reach) {
+    if (watch_.note(now_, a, b, normal, speed, reach, restitution_)) {
+      ++statistics_.ambiguous_impacts;
+    }
+  }
+
+  // --- policy `simultaneous`
+
+  // Balls that touch each other, or through others, at this instant.
+  struct Cluster {
+    std::vector<Slot> members;  // by ascending id
+    std::vector<ClusterBody<Real>> bodies;
+    std::vector<ClusterContact<Real>> contacts;  // by bodies
+  };
+
+  // One round of joint reflections of the cluster around an impact of `slot`, which is not queued.
+  // @param other  the ball it meets, or kNoSlot
+  // @return false: nothing else approaches there, and the impact is one like others
+  bool meetTogether(Slot slot, Slot other) {
+    Cluster cluster = clusterAround(slot, other);
+    keepApproaching(cluster.bodies, cluster.contacts);
+    if (cluster.contacts.size() < 2) return false;
+    if (orderMatters<Real>(cluster.bodies, cluster.contacts, restitution_)) {
+      ++statistics_.ambiguous_impacts;
+    }
+    const Real e = recordImpacts(cluster) ? Real(1) : restitution_;
+    reflectTogether(cluster.bodies, cluster.contacts, e);
+    std::vector<bool> changed(cluster.members.size(), false);
+    for (const ClusterContact<Real>& contact : cluster.contacts) {
+      changed[contact.a] = true;
+      if (!contact.withWall()) changed[contact.b] = true;
+    }
+    const auto forChanged = [&](auto f) {
+      for (std::size_t i = 0; i < changed.size(); ++i) {
+        if (changed[i]) f(cluster.members[i], cluster.bodies[i].v);
+      }
+    };
+    forChanged([&](Slot member, const Vec& v) {
+      settle(member);
+      bodies_[member].v = v;
+      if (member != slot) queue_.remove(member);
+    });
+    for (const ClusterContact<Real>& contact : cluster.contacts) conclude(cluster, contact);
+    forChanged([&](Slot member, const Vec&) { velocityChanged(member); });
+    forChanged([&](Slot member, const Vec&) { search(member); });
+    if (!changed[indexIn(cluster, slot)]) search(slot);
+    return true;
+  }
+
+  static std::size_t indexIn(const Cluster& cluster, Slot slot) {
+    const auto& members = cluster.members;
+    return static_cast<std::size_t>(std::find(members.begin(), members.end(), slot) -
+                                    members.begin());
+  }
+
+  Cluster clusterAround(Slot slot, Slot other) {
+    Cluster cluster;
+    std::vector<Slot>& members = cluster.members;
+    members.push_back(slot);
+    if (other != kNoSlot) members.push_back(other);
+    for (std::size_t k = 0; k < members.size(); ++k) {
+      if (isFixed(members[k])) continue;  // hands nothing on
+      forEachTouching(members[k], [&](Slot touched, const Vec&, Real) {
+        if (indexIn(cluster, touched) == members.size()) members.push_back(touched);
+      });
+    }
+    std::sort(members.begin(), members.end(),
+              [&](Slot a, Slot b) { return agendas_[a].id < agendas_[b].id; });
+    for (const Slot member : members) {
+      cluster.bodies.push_back({velocityNow(member), inverseMass(member)});
+    }
+    for (std::size_t i = 0; i < members.size(); ++i) addContacts(cluster, i);
+    return cluster;
+  }
+
+  // Calls f with each ball that `slot` touches now, the way to it, and the gap.
+  template <class Function>
+  void forEachTouching(Slot slot, Function f) {
+    using std::sqrt;
+    const Near near = nearTo(slot);
+    for (std::size_t i = 0; i < near.count; ++i) {
+      const Slot other = near.slots[i];
+      if (other == slot) continue;
+      const Vec nearest = nearestImage(positionNow(other) - positionNow(slot));
+      const Real reach = bodies_[slot].radius + bodies_[other].radius;
+      const Real extent = std::max(extentOf(slot), extentOf(other));
+      forEachImage([&](const Vec& image) {
+        const Vec dx = nearest + image;
+        const Real gap = sqrt(dot(dx, dx)) - reach;
+        if (touches(gap, reach, extent)) f(other, dx, gap);
+      });
+    }
+  }
+
+  // What a ball's place was last computed from: where it is, and how far it may have come.
+  Real extentOf(Slot slot) const {
+    const Vec v = velocityNow(slot);
+    return positionNow(slot).cwiseAbs().maxCoeff() + std::sqrt(dot(v, v)) * now_;
+  }
+
+  Vec accelerationOf(Slot slot) const {
+    if constexpr (kGravity) return contacts_.acceleration(slot);
+    return Vec::Zero();
+  }
+
+  // Those of member i with walls, and with members after it.
+  void addContacts(Cluster& cluster, std::size_t i) {
+    const Slot slot = cluster.members[i];
+    const Real radius = bodies_[slot].radius;
+    for (std::size_t k = 0; k < walls_.size() && !isFixed(slot); ++k) {
+      const Real gap = dot(positionNow(slot), walls_[k].normal) - walls_[k].offset - radius;
+      if (!touches(gap, radius, extentOf(slot))) continue;
+      ClusterContact<Real> contact;
+      contact.a = i;
+      contact.wall = k;
+      contact.normal = -walls_[k].normal;
+      contact.gap = gap;
+      contact.reach = radius;
+      cluster.contacts.push_back(contact);
+    }
+    forEachTouching(slot, [&](Slot other, const Vec& dx, Real gap) {
+      const std::size_t j = indexIn(cluster, other);
+      if (j <= i || j == cluster.members.size() || (isFixed(slot) && isFixed(other))) return;
+      ClusterContact<Real> contact;
+      contact.a = i;
+      contact.b = j;
+      contact.normal = contactNormal<Real>(dx);
+      contact.gap = gap;
+      contact.reach = radius + bodies_[other].radius;
+      const Vec pressing = accelerationOf(slot) - accelerationOf(other);
+      contact.least_rebound = leastRebound<Real>(dot(pressing, contact.normal), contact.reach);
+      cluster.contacts.push_back(contact);
+    });
+  }
+
+  // Tells the guard against collapse, once a ball, by its fastest contact. @return whether any ball
+  // is in a collapse
+  bool recordImpacts(const Cluster& cluster) {
+    if (!(restitution_ < 1)) return false;
+    bool collapses = false;
+    for (std::size_t i = 0; i < cluster.members.size(); ++i) {
+      const Slot slot = cluster.members[i];
+      Real speed = 0;
+      Real reach = 0;
+      for (const ClusterContact<Real>& contact : cluster.contacts) {
+        if (contact.a != i && contact.b != i) continue;
+        if (contact.withWall() && dot(accelerationOf(slot), contact.normal) > 0) continue;
+        if (contact.approach_speed > speed) {
+          speed = contact.approach_speed;
+          reach = contact.reach;
+        }
+      }
+      if (speed > 0 && histories_[slot].record(now_, speed, reach)) collapses = true;
+    }
+    return collapses;
+  }
+
+  // Counts and reports a contact after its impact.
+  void conclude(const Cluster& cluster, const ClusterContact<Real>& contact) {
+    if (!(contact.impulse > 0)) return;
+    const Slot slot = cluster.members[contact.a];
+    noteOverlap(-contact.gap);
+    if (!contact.withWall()) {
+      ++statistics_.ball_collisions;
+      statistics_.virial += double(contact.impulse * contact.reach);
+      report(slot, agendas_[cluster.members[contact.b]].id, contact.normal, contact.impulse,
+             contact.approach_speed);
+      return;
+    }
+    const Wall<Real>& wall = walls_[contact.wall];
+    if constexpr (kGravity) {
+      const Body<Real>& body = bodies_[slot];
+      const Real pull = dot(contacts_.acceleration(slot), wall.normal);
+      if (comesToRest<Real>(dot(body.v, wall.normal), pull, body.radius)) {
+        contacts_.rest(slot, static_cast<int>(contact.wall));
+      }
+    }
+    ++statistics_.wall_collisions;
+    report(slot, wall.partner, contact.normal, contact.impulse, contact.approach_speed);
   }
 
   // After any change of velocity: events found with the old one are stale; walls rested on are
@@ -761,15 +958,30 @@ class EventDriven final : public Method {
 
   void findNextEvent(Slot slot, const JustMet& met = {}) {
     Found found;
-    if (listed_) {
-      considerBalls(seekerAt(slot, met), lists_.of(slot), lists_.count(slot), found);
-    } else {
-      grid_.gatherNear(agendas_[slot].cell, agendas_[slot].level, candidates_);
-      considerBalls(seekerAt(slot, met), candidates_.slots.data(), candidates_.count, found);
-    }
+    considerBalls(seekerAt(slot, met), nearTo(slot), found);
     considerWallsOf(slot, found);
     setImpact(slot, found);
     findCrossing(slot);
+  }
+
+  // Balls as PairSearch takes them.
+  struct Near {
+    const Slot* slots;
+    std::size_t count;
+  };
+
+  // All that a ball can meet before its crossing, perhaps itself among them.
+  Near nearTo(Slot slot) {
+    if (listed_) return {lists_.of(slot), lists_.count(slot)};
+    grid_.gatherNear(agendas_[slot].cell, agendas_[slot].level, candidates_);
+    return {candidates_.slots.data(), candidates_.count};
+  }
+
+  // Calls f with the shifts of the images that are in reach of a ball beside the nearest.
+  template <class Function>
+  void forEachImage(Function f) const {
+    if (images_.empty()) return f(Vec(Vec::Zero()));
+    for (const Vec& image : images_) f(image);
   }
 
   void setImpact(Slot slot, const Found& found) {
@@ -792,39 +1004,38 @@ class EventDriven final : public Method {
 
   // Takes the earliest impact with any of the balls, if it is earlier than `found`. The ball
   // itself may be among them: it never approaches itself.
-  void considerBalls(const Search& search, const Slot* slots, std::size_t count, Found& found) {
-    if (images_.empty()) return considerList(search, slots, count, found);
+  void considerBalls(const Search& search, const Near& near, Found& found) {
+    if (images_.empty()) return considerImages(search, near, found);
     for (const Vec& image : images_) {
       Search shifted = search;
       shifted.seeker.x -= image;
-      considerList(shifted, slots, count, found);
+      considerImages(shifted, near, found);
     }
   }
 
-  void considerList(const Search& search, const Slot* slots, std::size_t count, Found& found) {
-    if (kGravity && !allFallFreely(search.slot, slots, count)) {
-      return considerEach(search, slots, count, found);
-    }
-    const PairHit<Real> hit = search_pairs_(bodies_.data(), slots, count, search.seeker, space_);
+  void considerImages(const Search& search, const Near& near, Found& found) {
+    if (kGravity && !allFallFreely(search.slot, near)) return considerEach(search, near, found);
+    const PairHit<Real> hit =
+        search_pairs_(bodies_.data(), near.slots, near.count, search.seeker, space_);
     if (!(now_ + hit.wait <= found.time)) return;
-    const Slot other = slots[hit.index];
+    const Slot other = near.slots[hit.index];
     if (hit.tied || other == search.met.partner) {  // seldom, and then not so simple
-      considerEach(search, slots, count, found);
+      considerEach(search, near, found);
     } else {
       takeIfEarlier(other, now_ + hit.wait, found);
     }
   }
 
-  bool allFallFreely(Slot slot, const Slot* slots, std::size_t number) const {
+  bool allFallFreely(Slot slot, const Near& near) const {
     const auto falls = [this](Slot s) { return contacts_.fallsFreely(s); };
-    return falls(slot) && std::all_of(slots, slots + number, falls);
+    return falls(slot) && std::all_of(near.slots, near.slots + near.count, falls);
   }
 
   // The same, one by one: also where balls fall differently, or were just met, or tie.
-  void considerEach(const Search& search, const Slot* slots, std::size_t number, Found& found) {
+  void considerEach(const Search& search, const Near& near, Found& found) {
     const Seeker<Real>& seeker = search.seeker;
-    for (std::size_t i = 0; i < number; ++i) {
-      const Slot other = slots[i];
+    for (std::size_t i = 0; i < near.count; ++i) {
+      const Slot other = near.slots[i];
       Vec dx = positionNow(other) - seeker.x;
       if (images_.empty()) dx = nearestImage(dx);
       const Vec dv = velocityNow(other) - seeker.v;
@@ -986,6 +1197,7 @@ class EventDriven final : public Method {
   static constexpr std::int32_t kFarthestCell = 1 << 30;
 
   Surroundings surroundings_;
+  SimultaneousImpacts policy_;
   Real restitution_;
   std::vector<Wall<Real>> walls_;
   std::array<std::uint32_t, 6> face_walls_{};  // indices into walls_, by face
@@ -1024,6 +1236,7 @@ class EventDriven final : public Method {
   Real now_ = 0;  // s, in this year
   Time reached_;  // what now() tells
   std::uint64_t events_at_new_year_ = 0;
+  OrderWatch<Real> watch_;
   Statistics statistics_;
   CollisionLog* log_ = nullptr;
 };
