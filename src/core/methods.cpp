@@ -5,6 +5,7 @@
 
 #include "ball_sim/brute_force.hpp"
 #include "ball_sim/text.hpp"
+#include "continuous/make_continuous.hpp"
 #include "event_driven/make_event_driven.hpp"
 
 namespace ball_sim::core {
@@ -19,7 +20,8 @@ namespace {
 }  // namespace
 
 const std::vector<std::string>& methodNames() {
-  static const std::vector<std::string> names = {"auto", "event_driven", "brute_force"};
+  static const std::vector<std::string> names = {"auto", "event_driven", "continuous",
+                                                 "brute_force"};
   return names;
 }
 
@@ -33,6 +35,9 @@ MethodChoice chooseMethod(const std::string& name, const Scene& /*scene*/) {
 std::unique_ptr<Method> makeMethod(const std::string& name, const Surroundings& surroundings,
                                    const MethodSettings& settings) {
   if (name == "event_driven") return makeEventDriven(surroundings, settings.precision);
+  if (name == "continuous") {
+    return makeContinuous(surroundings, settings.precision, settings.threads);
+  }
   if (name != "brute_force") refuse(name);
   if (settings.precision == Precision::double_precision) {
     return std::make_unique<BruteForce<double>>(surroundings);
