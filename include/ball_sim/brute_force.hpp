@@ -135,7 +135,6 @@ class BruteForce final : public Method {
 
  private:
   static constexpr BallId kNobody = ~BallId{0};
-  static constexpr std::uint64_t kWallKey = std::uint64_t{1} << 32;  // beyond all ids of balls
 
   struct Body {
     BallId id = 0;
@@ -339,8 +338,8 @@ class BruteForce final : public Method {
     ++statistics_.wall_collisions;
     const Vec at_rest = Vec::Zero();
     watch({body.id, body.v, body.w, (1 + e) * speed},
-          {kWallKey + static_cast<std::uint64_t>(index), at_rest, 0, 0}, -wall.normal, speed,
-          body.radius);
+          {OrderWatch<Real>::wallKey(static_cast<std::size_t>(index)), at_rest, 0, 0}, -wall.normal,
+          speed, body.radius);
     report(body, wall.partner, -wall.normal, (1 + e) * speed / body.w, speed);
   }
 

@@ -433,6 +433,11 @@ class OrderWatch {
   using Vec = VectorOf<Real>;
 
  public:
+  /// The key of a wall, beyond all ids of balls.
+  static constexpr std::uint64_t wallKey(std::size_t index) {
+    return (std::uint64_t{1} << 32) + index;
+  }
+
   /// A partner of an impact: a ball by any number that is its own, or a wall.
   struct Side {
     std::uint64_t key;

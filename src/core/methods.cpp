@@ -6,6 +6,7 @@
 
 #include "ball_sim/brute_force.hpp"
 #include "ball_sim/text.hpp"
+#include "continuous/make_continuous.hpp"
 #include "discrete/discrete.hpp"
 #include "event_driven/make_event_driven.hpp"
 #include "soft_sphere/soft_sphere.hpp"
@@ -19,11 +20,17 @@ namespace {
                               formatList(methodNames()));
 }
 
+void refuseJointImpacts(const std::string& name, const MethodSettings& settings) {
+  if (settings.simultaneous_impacts == SimultaneousImpacts::sequential) return;
+  throw std::invalid_argument("simultaneous_impacts: 'simultaneous': method " + name +
+                              " cannot take impacts together; event_driven can");
+}
+
 }  // namespace
 
 const std::vector<std::string>& methodNames() {
-  static const std::vector<std::string> names = {"auto", "event_driven", "discrete", "soft_sphere",
-                                                 "brute_force"};
+  static const std::vector<std::string> names = {"auto",     "event_driven", "continuous",
+                                                 "discrete", "soft_sphere",  "brute_force"};
   return names;
 }
 
@@ -41,7 +48,11 @@ void checkTimeStep(double time_step) {
 std::unique_ptr<Method> makeMethod(const std::string& name, const Surroundings& surroundings,
                                    const MethodSettings& settings) {
   checkTimeStep(settings.time_step);
+  if (name != "event_driven" && name != "brute_force") refuseJointImpacts(name, settings);
   if (name == "event_driven") return makeEventDriven(surroundings, settings);
+  if (name == "continuous") {
+    return makeContinuous(surroundings, settings.precision, settings.threads);
+  }
   if (name == "discrete") return makeDiscrete(surroundings, settings);
   if (name == "soft_sphere") return makeSoftSphere(surroundings, settings);
   if (name != "brute_force") refuse(name);

@@ -169,6 +169,7 @@ int runScene(const RunOptions& options) {
   world_options.method = options.method;
   world_options.time_step = options.time_step;
   world_options.precision = options.precision;
+  world_options.threads = options.threads;
   const Scene scene = readScene(options.scene);
   World world(scene, world_options);
   Outputs outputs(options);

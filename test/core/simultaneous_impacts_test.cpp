@@ -335,7 +335,7 @@ TEST_P(Policies, randomTouchingClustersConserveAndPart) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Methods, Policies, testing::ValuesIn(exactMethods()), methodOf);
+INSTANTIATE_TEST_SUITE_P(Methods, Policies, testing::ValuesIn(jointMethods()), methodOf);
 
 // --- the pure functions
 

@@ -41,6 +41,7 @@
 #include "event_driven/huge_page_vector.hpp"
 #include "event_driven/neighbour_lists.hpp"
 #include "event_driven/pair_search.hpp"
+#include "impact.hpp"
 
 namespace ball_sim::core {
 
@@ -202,7 +203,6 @@ class EventDriven final : public Method {
 
  private:
   static constexpr std::uint32_t kWall = 0xF8000000;
-  static constexpr std::uint64_t kWallKey = std::uint64_t{1} << 32;  // beyond all ids of balls
 
   // The ball that another has parted from at this instant.
   struct JustMet {
@@ -688,6 +688,10 @@ class EventDriven final : public Method {
     }
   }
 
+  Impacting<Real> impacting(Slot slot) {
+    return {bodies_[slot].v, inverseMass(slot), restitution_ < 1 ? histories_[slot] : no_history_};
+  }
+
   void meetBall(Slot first, Slot second) {
     if (policy_ == SimultaneousImpacts::simultaneous && meetTogether(first, second)) return;
     if (agendas_[second].id < agendas_[first].id) std::swap(first, second);
@@ -697,25 +701,18 @@ class EventDriven final : public Method {
     Body<Real>& b = bodies_[second];
     const Real reach = a.radius + b.radius;
     const Vec dx = contactVector(a, b, reach);
-    const Vec n = contactNormal<Real>(dx);
-    Real e = restitution_;
-    Real least = 0;
+    Vec pressing = Vec::Zero();
     if constexpr (kGravity) {
-      const Vec pressing = contacts_.acceleration(first) - contacts_.acceleration(second);
-      least = leastRebound<Real>(dot(pressing, n), reach);
+      pressing = contacts_.acceleration(first) - contacts_.acceleration(second);
     }
-    if (e < 1) {
-      const Real speed = dot(a.v, n) - dot(b.v, n);
-      const bool a_collapses = histories_[first].record(now_, speed, reach);
-      const bool b_collapses = histories_[second].record(now_, speed, reach);
-      if (a_collapses || b_collapses) e = 1;
-    }
-    const Exchange<Real> passed =
-        collide<Real>(a.v, inverseMass(first), b.v, inverseMass(second), n, e, least);
+    const auto impact = core::meetBall<Real>(dx, reach, pressing, restitution_, now_,
+                                             impacting(first), impacting(second));
+    const Vec& n = impact.normal;
+    const Exchange<Real>& passed = impact.exchange;
     if (passed.impulse > 0) {
       ++statistics_.ball_collisions;
       statistics_.virial += double(passed.impulse * reach);
-      noteOverlap(reach - dot(dx, n));
+      noteOverlap(impact.overlap);
       watch({agendas_[first].id, a.v, inverseMass(first), passed.change1},
             {agendas_[second].id, b.v, inverseMass(second), passed.change2}, n,
             passed.approach_speed, reach);
@@ -736,22 +733,20 @@ class EventDriven final : public Method {
     const Wall<Real>& wall = walls_[index];
     Real pull = 0;
     if constexpr (kGravity) pull = dot(contacts_.acceleration(slot), wall.normal);
-    const Real speed = -dot(body.v, wall.normal);
-    Real e = restitution_;
-    if (e < 1 && !(pull < 0) && histories_[slot].record(now_, speed, body.radius)) e = 1;
-    noteOverlap(wall.offset + body.radius - dot(body.x, wall.normal));
-    collideWithWall<Real>(body.v, wall.normal, e);
+    const auto impact =
+        core::meetWall<Real>(wall, body.x, body.radius, pull, restitution_, now_, impacting(slot));
+    noteOverlap(impact.overlap);
     if constexpr (kGravity) {
-      if (comesToRest<Real>(dot(body.v, wall.normal), pull, body.radius)) {
-        contacts_.rest(slot, static_cast<int>(index));
-      }
+      if (impact.rests) contacts_.rest(slot, static_cast<int>(index));
     }
-    if (speed > 0) {
+    if (impact.speed > 0) {
       ++statistics_.wall_collisions;
       const Vec at_rest = Vec::Zero();
-      watch({agendas_[slot].id, body.v, inverseMass(slot), (1 + e) * speed},
-            {kWallKey + index, at_rest, 0, 0}, -wall.normal, speed, body.radius);
-      report(slot, wall.partner, -wall.normal, (1 + e) * speed * Real(agendas_[slot].mass), speed);
+      const Real change = (1 + impact.restitution) * impact.speed;
+      watch({agendas_[slot].id, body.v, inverseMass(slot), change},
+            {OrderWatch<Real>::wallKey(index), at_rest, 0, 0}, -wall.normal, impact.speed,
+            body.radius);
+      report(slot, wall.partner, -wall.normal, change * Real(agendas_[slot].mass), impact.speed);
     }
     velocityChanged(slot);
     search(slot);
@@ -1208,6 +1203,7 @@ class EventDriven final : public Method {
   HugePageVector<Body<Real>> bodies_;
   HugePageVector<Agenda<Real>> agendas_;
   std::vector<ImpactHistory<Real>> histories_;  // only where restitution is below 1
+  ImpactHistory<Real> no_history_;              // stands in for them elsewhere
   Contacts<Real> contacts_;                     // only with gravity
   std::vector<Slot> slots_;                     // of the balls there are, by ascending id
   std::vector<Slot> free_slots_;
