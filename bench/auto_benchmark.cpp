@@ -5,8 +5,8 @@
 // usage: auto_benchmark [SCENE.yaml ...] [WORD]
 // Without scenes: those made here, of every kind that the choice is about, or those of them with
 // WORD in their names. Each method that keeps the tolerance runs a scene for the same simulated
-// time, in turns, three times; the median counts. Set-up and a first tenth are not counted. A method
-// that needs more than 10 s of CPU time is given up.
+// time, in turns, three times; the median counts. Set-up and a first tenth are not counted. A
+// method that needs more than 10 s of CPU time is given up.
 //
 // What keeps a tolerance: places below the horizon of chaos are within it of those of event_driven
 // in long double. A scene in which balls come to lie on balls has no such places; there it is the

@@ -37,7 +37,8 @@ struct SceneNumbers {
   double smallest_radius = 0;   ///< m
   double mean_speed = 0;        ///< m/s, relative to the common motion, and after a fall
   double collision_rate = 0;    ///< 1/s, ball-ball collisions of a ball; each counts for both
-  double highest_rate = 0;      ///< 1/s, the same of the size of balls that has most of them
+  double highest_rate = 0;      ///< 1/s, of the size of balls that is turned most: the same, each
+                                ///< by 2 m_b/(m_a + m_b) of the velocity that it hands on
   double bits_per_collision = 0;  ///< growth of errors, by a factor of two to this, per collision
 
   /// Whether there is no fluid to speak of; and any method takes no time.
@@ -59,7 +60,7 @@ constexpr double kCostOfStep = 0.3e-6;
 double enskogCollisionRate(const std::vector<Ball>& balls, double volume, bool planar);
 
 /// When the first trajectories are beyond the horizon, s; +infinity: nothing collides. Of mixed
-/// sizes the large balls have most collisions, and hand their errors on.
+/// sizes these are of the balls that are turned most often, by collisions with heavier ones.
 double horizonInSeconds(const SceneNumbers& numbers, double tolerance);
 
 /// Bits by which the distance of two trajectories grows per collision of a ball, in an equilibrated

@@ -27,6 +27,7 @@ constexpr std::array<MethodCosts, 2> kCosts = {{{"event_driven", 0.8e-6, 1.5e-6,
 struct SizeClass {
   double count = 0;
   double radius = 0;  // m, mean
+  double mass = 0;    // kg, mean
   double speed2 = 0;  // m^2/s^2, mean square of a component of the velocity
   bool fixed = false;
 };
@@ -60,6 +61,7 @@ std::vector<SizeClass> classesOf(const std::vector<Ball>& balls, bool fixed, con
     size.fixed = fixed;
     size.count += 1;
     size.radius += ball.radius;
+    size.mass += ball.mass;
     size.speed2 += dot(v, v) / dimension;
   }
   classes.erase(std::remove_if(classes.begin(), classes.end(),
@@ -67,6 +69,7 @@ std::vector<SizeClass> classesOf(const std::vector<Ball>& balls, bool fixed, con
                 classes.end());
   for (SizeClass& size : classes) {
     size.radius /= size.count;
+    size.mass /= size.count;
     size.speed2 /= size.count;
   }
   return classes;
@@ -81,8 +84,13 @@ double moment(const std::vector<SizeClass>& classes, double volume, int power, b
 
 struct EnskogRates {
   double mean = 0;     // 1/s
-  double highest = 0;  // 1/s, of any class
+  double highest = 0;  // 1/s, of any class, each collision by what it turns the ball
 };
+
+// How much of the relative velocity a collision gives a ball, in units of that of equal masses.
+double turnOf(const SizeClass& i, const SizeClass& j) {
+  return j.fixed ? 2 : 2 * j.mass / (i.mass + j.mass);
+}
 
 // Collisions of a ball of class i with those of class j, 1/s.
 double rateOf(const SizeClass& i, const SizeClass& j, double eta, double below, double volume,
@@ -112,10 +120,15 @@ EnskogRates enskogRates(const std::vector<Ball>& balls, double volume, bool plan
   for (const SizeClass& i : classes) {
     if (i.fixed) continue;
     double rate = 0;
-    for (const SizeClass& j : classes) rate += rateOf(i, j, eta, below, volume, planar);
+    double turning = 0;
+    for (const SizeClass& j : classes) {
+      const double with_j = rateOf(i, j, eta, below, volume, planar);
+      rate += with_j;
+      turning += with_j * turnOf(i, j);
+    }
     movable += i.count;
     rates.mean += i.count * rate;
-    rates.highest = std::max(rates.highest, rate);
+    rates.highest = std::max(rates.highest, turning);
   }
   if (movable > 0) rates.mean /= movable;
   return rates;
