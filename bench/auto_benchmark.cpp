@@ -112,7 +112,7 @@ double checkedTime(const Case& test) {
   const double tolerance = test.scene.tolerance.value_or(kDefaultTolerance);
   const double most = horizonInCollisions(numbers.bits_per_collision, tolerance);
   const double root = std::sqrt(6.25 + most) - 2.5;  // of c, where c + 5 sqrt(c) is the most
-  return std::min(test.seconds, root * root / numbers.highest_rate);
+  return std::min(test.seconds, root * root / numbers.collision_rate);
 }
 
 void checkPlaces(const Case& test, const std::string& method, Outcome& outcome) {

@@ -281,9 +281,8 @@ bool AutoMethod::beyondHorizon() const {
   if (stepping_ || !(numbers_.collision_rate > 0) || numbers_.areFew()) return false;
   const double per_ball = 2 * static_cast<double>(statistics().ball_collisions) /
                           static_cast<double>(std::max<std::size_t>(1, movable_));
-  const double of_most = per_ball * numbers_.highest_rate / numbers_.collision_rate;
-  return of_most > horizonInCollisions(numbers_.bits_per_collision,
-                                       settings_.tolerance.value_or(kVisibleError));
+  return per_ball > horizonInCollisions(numbers_.bits_per_collision,
+                                        settings_.tolerance.value_or(kVisibleError));
 }
 
 Statistics AutoMethod::statistics() const {
