@@ -76,6 +76,7 @@ class AutoMethod final : public Method {
   void judge(const Look& look);
   void judgeExact(const Look& look);
   void judgeStepping(const Look& look);
+  double energyLimit(const Look& look) const;
   bool floods(const Look& look) const;
   std::string stirring(const Look& look) const;
   void considerCheaper(const Look& look);
