@@ -108,11 +108,11 @@ double checkedTime(const Case& test) {
   std::vector<Ball> balls;
   for (const BallId id : world.ids()) balls.push_back(world.ball(id));
   const SceneNumbers numbers = sceneNumbers(world.surroundings(), balls);
-  if (numbers.areFew() || !(numbers.collision_rate > 0)) return std::min(1.0, test.seconds);
+  if (!(numbers.collision_rate > 0)) return std::min(1.0, test.seconds);
   const double tolerance = test.scene.tolerance.value_or(kDefaultTolerance);
   const double most = horizonInCollisions(numbers.bits_per_collision, tolerance);
   const double root = std::sqrt(6.25 + most) - 2.5;  // of c, where c + 5 sqrt(c) is the most
-  return std::min(test.seconds, root * root / numbers.highest_rate);
+  return std::min(test.seconds, root * root / numbers.collision_rate);
 }
 
 void checkPlaces(const Case& test, const std::string& method, Outcome& outcome) {

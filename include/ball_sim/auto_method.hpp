@@ -37,6 +37,7 @@ class AutoMethod final : public Method {
 
   const char* name() const override { return method_->name(); }
   std::string reason() const override;
+  std::string warning() const override { return method_->warning(); }
 
   void insert(BallId id, const Ball& ball) override;
   void remove(BallId id) override;
@@ -76,6 +77,7 @@ class AutoMethod final : public Method {
   void judge(const Look& look);
   void judgeExact(const Look& look);
   void judgeStepping(const Look& look);
+  double energyLimit(const Look& look) const;
   bool floods(const Look& look) const;
   std::string stirring(const Look& look) const;
   void considerCheaper(const Look& look);

@@ -37,8 +37,8 @@ struct SceneNumbers {
   double smallest_radius = 0;   ///< m
   double mean_speed = 0;        ///< m/s, relative to the common motion, and after a fall
   double collision_rate = 0;    ///< 1/s, ball-ball collisions of a ball; each counts for both
-  double highest_rate = 0;      ///< 1/s, the same of the size of balls that has most of them
-  double bits_per_collision = 0;  ///< growth of errors, by a factor of two to this, per collision
+  double bits_per_collision = 0;  ///< by which errors grow while a ball has a collision, of the
+                                  ///< size of balls whose errors grow fastest
 
   /// Whether there is no fluid to speak of; and any method takes no time.
   bool areFew() const { return balls < 32; }
@@ -58,8 +58,7 @@ constexpr double kCostOfStep = 0.3e-6;
 /// Limits: the fluid; at a packing fraction of 0.45 (planar: 0.6) a few percent low.
 double enskogCollisionRate(const std::vector<Ball>& balls, double volume, bool planar);
 
-/// When the first trajectories are beyond the horizon, s; +infinity: nothing collides. Of mixed
-/// sizes the large balls have most collisions, and hand their errors on.
+/// When trajectories are beyond the horizon, s; +infinity: nothing collides.
 double horizonInSeconds(const SceneNumbers& numbers, double tolerance);
 
 /// Bits by which the distance of two trajectories grows per collision of a ball, in an equilibrated

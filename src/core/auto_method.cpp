@@ -193,10 +193,15 @@ void AutoMethod::judgeExact(const Look& look) {
                            " events per ball and second where balls lie on balls; steps of " +
                            formatShort(step) + " s until they are stirred" +
                            (settings_.tolerance ? "" : ", exact no longer"));
-  // What resting contacts hold in overlap, and what a step of free fall is off by.
+  energy_limit_ = energyLimit(look);
+}
+
+// Left alone, a pile has no more energy than now, but for what resting contacts hold in overlap and
+// what a step of free fall is off by: less than lifts every ball by its radius.
+double AutoMethod::energyLimit(const Look& look) const {
   double weight = 0;  // N
   for (const Properties& ball : balls_) weight += std::isinf(ball.mass) ? 0 : gravity_ * ball.mass;
-  energy_limit_ = look.energy + weight * numbers_.mean_radius;
+  return look.energy + weight * numbers_.mean_radius;
 }
 
 // Whether nearly all events are those of balls that are held up by others.
@@ -209,7 +214,7 @@ bool AutoMethod::floods(const Look& look) const {
 
 void AutoMethod::judgeStepping(const Look& look) {
   const std::string stirred = stirring(look);
-  if (energy_limit_ == std::numeric_limits<double>::infinity()) energy_limit_ = look.energy;
+  if (energy_limit_ == std::numeric_limits<double>::infinity()) energy_limit_ = energyLimit(look);
   if (stirred.empty() || now() - changed_at_ < stay_) return;
   changeTo(exact_name_, stirred);
 }
@@ -281,9 +286,8 @@ bool AutoMethod::beyondHorizon() const {
   if (stepping_ || !(numbers_.collision_rate > 0) || numbers_.areFew()) return false;
   const double per_ball = 2 * static_cast<double>(statistics().ball_collisions) /
                           static_cast<double>(std::max<std::size_t>(1, movable_));
-  const double of_most = per_ball * numbers_.highest_rate / numbers_.collision_rate;
-  return of_most > horizonInCollisions(numbers_.bits_per_collision,
-                                       settings_.tolerance.value_or(kVisibleError));
+  return per_ball > horizonInCollisions(numbers_.bits_per_collision,
+                                        settings_.tolerance.value_or(kVisibleError));
 }
 
 Statistics AutoMethod::statistics() const {

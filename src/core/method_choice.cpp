@@ -27,6 +27,7 @@ constexpr std::array<MethodCosts, 2> kCosts = {{{"event_driven", 0.8e-6, 1.5e-6,
 struct SizeClass {
   double count = 0;
   double radius = 0;  // m, mean
+  double mass = 0;    // kg, mean
   double speed2 = 0;  // m^2/s^2, mean square of a component of the velocity
   bool fixed = false;
 };
@@ -60,6 +61,7 @@ std::vector<SizeClass> classesOf(const std::vector<Ball>& balls, bool fixed, con
     size.fixed = fixed;
     size.count += 1;
     size.radius += ball.radius;
+    size.mass += ball.mass;
     size.speed2 += dot(v, v) / dimension;
   }
   classes.erase(std::remove_if(classes.begin(), classes.end(),
@@ -67,6 +69,7 @@ std::vector<SizeClass> classesOf(const std::vector<Ball>& balls, bool fixed, con
                 classes.end());
   for (SizeClass& size : classes) {
     size.radius /= size.count;
+    size.mass /= size.count;
     size.speed2 /= size.count;
   }
   return classes;
@@ -78,11 +81,6 @@ double moment(const std::vector<SizeClass>& classes, double volume, int power, b
   for (const SizeClass& size : classes) sum += size.count * std::pow(2 * size.radius, power);
   return (planar ? kPi / 4 : kPi / 6) * sum / volume;
 }
-
-struct EnskogRates {
-  double mean = 0;     // 1/s
-  double highest = 0;  // 1/s, of any class
-};
 
 // Collisions of a ball of class i with those of class j, 1/s.
 double rateOf(const SizeClass& i, const SizeClass& j, double eta, double below, double volume,
@@ -100,26 +98,36 @@ double rateOf(const SizeClass& i, const SizeClass& j, double eta, double below, 
   return j.count / volume * chi * kPi * reach * reach * std::sqrt(8 / kPi) * root;
 }
 
-EnskogRates enskogRates(const std::vector<Ball>& balls, double volume, bool planar) {
-  const int dimension = planar ? 2 : 3;
-  const Vector3 common = commonVelocity(balls);
-  std::vector<SizeClass> classes = classesOf(balls, false, common, dimension);
-  for (const SizeClass& size : classesOf(balls, true, common, dimension)) classes.push_back(size);
-  const double eta = std::min(0.99, moment(classes, volume, dimension, planar));
-  const double below = moment(classes, volume, dimension - 1, planar);  // xi_2; planar: xi_1
-  EnskogRates rates;
-  double movable = 0;
-  for (const SizeClass& i : classes) {
-    if (i.fixed) continue;
-    double rate = 0;
-    for (const SizeClass& j : classes) rate += rateOf(i, j, eta, below, volume, planar);
-    movable += i.count;
-    rates.mean += i.count * rate;
-    rates.highest = std::max(rates.highest, rate);
+// The fluid as classes, with what the rates of all pairs depend on.
+struct Mixture {
+  Mixture(const std::vector<Ball>& balls, double space, bool is_planar)
+      : planar(is_planar), volume(space) {
+    const int dimension = planar ? 2 : 3;
+    const Vector3 common = commonVelocity(balls);
+    classes = classesOf(balls, false, common, dimension);
+    for (const SizeClass& size : classesOf(balls, true, common, dimension)) {
+      classes.push_back(size);
+    }
+    eta = std::min(0.99, moment(classes, volume, dimension, planar));
+    below = moment(classes, volume, dimension - 1, planar);
   }
-  if (movable > 0) rates.mean /= movable;
-  return rates;
-}
+
+  double rate(const SizeClass& i, const SizeClass& j) const {
+    return rateOf(i, j, eta, below, volume, planar);
+  }
+
+  double rate(const SizeClass& i) const {
+    double sum = 0;
+    for (const SizeClass& j : classes) sum += rate(i, j);
+    return sum;
+  }
+
+  bool planar;
+  double volume;
+  double eta = 0;
+  double below = 0;  // xi_2; planar: xi_1
+  std::vector<SizeClass> classes;
+};
 
 // How far a ball would fall until it meets a wall, m; +infinity: there is none below it.
 double fallOf(const Ball& ball, const Vector3& gravity, const std::vector<Wall<double>>& walls) {
@@ -200,13 +208,8 @@ double volumeOf(const Surroundings& surroundings, const std::vector<Ball>& balls
   return volume;
 }
 
-}  // namespace
-
-double enskogCollisionRate(const std::vector<Ball>& balls, double volume, bool planar) {
-  return enskogRates(balls, volume, planar).mean;
-}
-
-double chaosBits(double packing_fraction, bool planar) {
+// Bits per collision at a mean free path, ln of diameters.
+double bitsOfPath(double log_path, bool planar) {
   // Measured return errors after time reversal: spheres at number densities 0.9, 0.5 and 0.1 per
   // diameter cubed, discs at area fractions 0.55 and 0.2.
   static const std::vector<ChaosPoint> spheres = {{logFreePath(0.9 * kPi / 6, false), 0.5},
@@ -214,9 +217,45 @@ double chaosBits(double packing_fraction, bool planar) {
                                                   {logFreePath(0.1 * kPi / 6, false), 3.3}};
   static const std::vector<ChaosPoint> discs = {{logFreePath(0.55, true), 0.8},
                                                 {logFreePath(0.2, true), 2.2}};
-  const double eta = std::clamp(packing_fraction, 1e-12, 0.7);
   constexpr double kLeast = 0.2;  // no fluid has less
-  return std::max(kLeast, interpolate(planar ? discs : spheres, logFreePath(eta, planar)));
+  return std::max(kLeast, interpolate(planar ? discs : spheres, log_path));
+}
+
+// How fast errors grow in a mixture, bits per second: of the class where it is fastest. The free
+// path counts in sums of radii of the partners; a light partner turns a heavy ball only so much.
+double errorGrowth(const Mixture& mixture) {
+  double fastest = 0;
+  for (const SizeClass& i : mixture.classes) {
+    if (i.fixed || !(i.speed2 > 0)) continue;
+    const double mean_speed = std::sqrt((mixture.planar ? kPi / 2 : 8 / kPi) * i.speed2);
+    const double path = mean_speed / mixture.rate(i);  // m
+    double growth = 0;
+    for (const SizeClass& j : mixture.classes) {
+      const double turn = j.fixed ? 2 : 2 * j.mass / (i.mass + j.mass);  // of equal masses: 1
+      const double bits = bitsOfPath(std::log(path / (i.radius + j.radius)), mixture.planar);
+      growth += mixture.rate(i, j) * (turn < 1 ? turn * bits : bits + std::log2(turn));
+    }
+    fastest = std::max(fastest, growth);
+  }
+  return fastest;
+}
+
+}  // namespace
+
+double enskogCollisionRate(const std::vector<Ball>& balls, double volume, bool planar) {
+  const Mixture mixture(balls, volume, planar);
+  double sum = 0;
+  double movable = 0;
+  for (const SizeClass& size : mixture.classes) {
+    if (size.fixed) continue;
+    sum += size.count * mixture.rate(size);
+    movable += size.count;
+  }
+  return movable > 0 ? sum / movable : 0;
+}
+
+double chaosBits(double packing_fraction, bool planar) {
+  return bitsOfPath(logFreePath(std::clamp(packing_fraction, 1e-12, 0.7), planar), planar);
 }
 
 double horizonInCollisions(double bits_per_collision, double tolerance) {
@@ -251,19 +290,18 @@ SceneNumbers sceneNumbers(const Surroundings& surroundings, const std::vector<Ba
   numbers.volume = volumeOf(surroundings, balls);
   if (!(numbers.volume > 0)) return numbers;
   numbers.packing_fraction = occupied / numbers.volume;
-  numbers.bits_per_collision = chaosBits(numbers.packing_fraction, numbers.planar);
   if (!(speed2 > 0)) return numbers;
-  const EnskogRates rates = enskogRates(balls, numbers.volume, numbers.planar);
+  const double rate = enskogCollisionRate(balls, numbers.volume, numbers.planar);
   const double faster = std::sqrt(1 + fallen * count / speed2);
   numbers.mean_speed *= faster;
-  numbers.collision_rate = rates.mean * faster;
-  numbers.highest_rate = rates.highest * faster;
+  numbers.collision_rate = rate * faster;
+  numbers.bits_per_collision = errorGrowth(Mixture(balls, numbers.volume, numbers.planar)) / rate;
   return numbers;
 }
 
 double horizonInSeconds(const SceneNumbers& numbers, double tolerance) {
-  if (!(numbers.highest_rate > 0)) return std::numeric_limits<double>::infinity();
-  return horizonInCollisions(numbers.bits_per_collision, tolerance) / numbers.highest_rate;
+  if (!(numbers.collision_rate > 0)) return std::numeric_limits<double>::infinity();
+  return horizonInCollisions(numbers.bits_per_collision, tolerance) / numbers.collision_rate;
 }
 
 std::optional<double> estimatedCost(const std::string& method, const SceneNumbers& numbers) {

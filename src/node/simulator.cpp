@@ -246,21 +246,23 @@ void Simulator::listen() {
   }
 }
 
-/// Logs a change of method, and once what the user should know of the scene.
+/// Logs a change of method, and once each what the user should know of scene and method.
 void Simulator::tellNews() {
   const core::MethodChoice method = world_.method();
   if (method.name != method_) {
     ROS_INFO_STREAM("method " << method.name << " (" << method.reason << ")");
     method_ = method.name;
   }
-  if (warned_) {
+  warnOnce(core::policyWarning(world_), warned_of_policy_);
+  warnOnce(world_.warning(), warned_of_method_);
+}
+
+void Simulator::warnOnce(const std::string& warning, bool& warned) {
+  if (warned || warning.empty()) {
     return;
   }
-  const std::string warning = core::policyWarning(world_);
-  if (!warning.empty()) {
-    ROS_WARN_STREAM(warning);
-    warned_ = true;
-  }
+  ROS_WARN_STREAM(warning);
+  warned = true;
 }
 
 SimStats Simulator::stats(Clock::time_point wall) {

@@ -100,6 +100,7 @@ class Simulator {
   void publishStates();
   void listen();
   void tellNews();
+  static void warnOnce(const std::string& warning, bool& warned);
   SimStats stats(Clock::time_point wall);
   double energy() const { return world_.kineticEnergy() + world_.potentialEnergy(); }
 
@@ -132,7 +133,8 @@ class Simulator {
   bool changed_ = true;     // from outside
   bool population_ = true;  // changed from outside
   std::string method_;      // the one last told of
-  bool warned_ = false;     // of impacts that the policy decided
+  bool warned_of_policy_ = false;
+  bool warned_of_method_ = false;
 
   // For ~stats.
   double reference_energy_ = 0;  // J, after the last change from outside

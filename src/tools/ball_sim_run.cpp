@@ -189,6 +189,7 @@ int runScene(const RunOptions& options) {
   }
   world.setCollisionLog(nullptr);
   warn(policyWarning(world));
+  warn(world.warning());
   if (!record.error.empty()) {
     std::fprintf(stderr, "ball_sim_run: could not go on at %s s: %s\n",
                  formatNumber(world.now().seconds()).c_str(), record.error.c_str());

@@ -314,7 +314,7 @@ TEST_P(Policies, randomTouchingClustersConserveAndPart) {
       EXPECT_LT(kept, 1);
     }
     if (!fixed && trial % 3 != 2) {
-      const auto change = momentumOf(scene, states) - momentumOf(scene, start);
+      const VectorOf<long double> change = momentumOf(scene, states) - momentumOf(scene, start);
       EXPECT_LT(double(change.norm()), 1e-13);
     }
     for (std::size_t i = 0; i < states.ids.size(); ++i) {
