@@ -3,7 +3,8 @@
 //
 // Each step finds the earliest impact of all pairs and all walls, moves every ball there, resolves
 // it, and begins anew: no queue, no cells, nothing remembered. Exact to rounding, O(N^2) an event;
-// for up to a few hundred balls.
+// for up to a few hundred balls. Impacts at one instant that share balls: see
+// simultaneous_impacts.hpp.
 #pragma once
 
 #include <algorithm>
@@ -16,6 +17,8 @@
 #include "ball_sim/collapse_guard.hpp"
 #include "ball_sim/collision_law.hpp"
 #include "ball_sim/method.hpp"
+#include "ball_sim/scene.hpp"
+#include "ball_sim/simultaneous_impacts.hpp"
 #include "ball_sim/time_of_impact.hpp"
 #include "ball_sim/walls.hpp"
 
@@ -27,8 +30,10 @@ class BruteForce final : public Method {
   using Vec = VectorOf<Real>;
 
  public:
-  explicit BruteForce(const Surroundings& surroundings)
+  explicit BruteForce(const Surroundings& surroundings,
+                      SimultaneousImpacts policy = SimultaneousImpacts::sequential)
       : surroundings_(surroundings),
+        policy_(policy),
         gravity_(surroundings.gravity.cast<Real>()),
         walls_(wallsOf<Real>(surroundings)) {}
 
@@ -82,7 +87,7 @@ class BruteForce final : public Method {
         advance(stride);  // only so far are the images of a periodic box looked at
       } else {
         advance(event.dt);
-        resolve(event);
+        if (policy_ == SimultaneousImpacts::sequential || !resolveTogether(event)) resolve(event);
       }
       if (elapsed_ > 1) restartClock(now());
     }
@@ -219,8 +224,16 @@ class BruteForce final : public Method {
 
   void considerPair(std::size_t a, std::size_t b, Event& first) const {
     if (bodies_[a].w == 0 && bodies_[b].w == 0) return;
-    const Vec dx = bodies_[b].x - bodies_[a].x;
-    const Vec nearest = nearestImage(dx);
+    forEachImage(a, b, [&](const Vec& image) {
+      const Real dt = pairTime(bodies_[a], bodies_[b], image);
+      if (dt < first.dt) first = {dt, a, b, false, image};
+    });
+  }
+
+  // Calls f with the way from a to the nearest image of b, and to those around it.
+  template <class Function>
+  void forEachImage(std::size_t a, std::size_t b, Function f) const {
+    const Vec nearest = nearestImage(bodies_[b].x - bodies_[a].x);
     const int reach_x = periodicAxes() > 0 ? 1 : 0;
     const int reach_z = periodicAxes() > 2 ? 1 : 0;
     for (int i = -reach_x; i <= reach_x; ++i) {
@@ -230,8 +243,7 @@ class BruteForce final : public Method {
           if (i != 0) image[0] += i * edge(0);
           if (j != 0) image[1] += j * edge(1);
           if (k != 0) image[2] += k * edge(2);
-          const Real dt = pairTime(bodies_[a], bodies_[b], image);
-          if (dt < first.dt) first = {dt, a, b, false, image};
+          f(image);
         }
       }
     }
@@ -270,6 +282,7 @@ class BruteForce final : public Method {
   void restartClock(Time now) {
     const Real passed = Real(now - base_);
     for (Body& body : bodies_) body.history.last -= passed;
+    watch_.setBack(passed);
     base_ = now;
     elapsed_ = 0;
   }
@@ -307,6 +320,7 @@ class BruteForce final : public Method {
     ++statistics_.ball_collisions;
     statistics_.virial += double(passed.impulse * reach);
     noteOverlap(reach - dot(dx, n));
+    watch({a.id, a.v, a.w, passed.change1}, {b.id, b.v, b.w, passed.change2}, n, speed, reach);
     report(a, static_cast<Partner>(b.id), n, passed.impulse, passed.approach_speed);
   }
 
@@ -322,7 +336,167 @@ class BruteForce final : public Method {
     velocityChanged(body);
     if (!(speed > 0)) return;
     ++statistics_.wall_collisions;
+    const Vec at_rest = Vec::Zero();
+    watch({body.id, body.v, body.w, (1 + e) * speed},
+          {OrderWatch<Real>::wallKey(static_cast<std::size_t>(index)), at_rest, 0, 0}, -wall.normal,
+          speed, body.radius);
     report(body, wall.partner, -wall.normal, (1 + e) * speed / body.w, speed);
+  }
+
+  void watch(const typename OrderWatch<Real>::Side& a, const typename OrderWatch<Real>::Side& b,
+             const Vec& normal, Real speed, Real reach) {
+    const Real e = Real(surroundings_.restitution);
+    if (watch_.note(elapsed_, a, b, normal, speed, reach, e)) ++statistics_.ambiguous_impacts;
+  }
+
+  // --- policy `simultaneous`
+
+  // A cluster: balls that touch each other or through others, at this instant.
+  struct Cluster {
+    std::vector<std::size_t> members;  // indices into bodies_, ascending
+    std::vector<ClusterBody<Real>> bodies;
+    std::vector<ClusterContact<Real>> contacts;  // by bodies
+  };
+
+  // One round of joint reflections of the cluster around an impact.
+  // @return false: nothing else approaches there, and the impact is one like others
+  bool resolveTogether(const Event& event) {
+    Cluster cluster = clusterAround(event);
+    keepApproaching(cluster.bodies, cluster.contacts);
+    if (cluster.contacts.size() < 2) return false;
+    const Real e = recordImpacts(cluster) ? Real(1) : Real(surroundings_.restitution);
+    if (orderMatters<Real>(cluster.bodies, cluster.contacts, Real(surroundings_.restitution))) {
+      ++statistics_.ambiguous_impacts;
+    }
+    reflectTogether(cluster.bodies, cluster.contacts, e);
+    for (std::size_t i = 0; i < cluster.members.size(); ++i) {
+      bodies_[cluster.members[i]].v = cluster.bodies[i].v;
+    }
+    for (const ClusterContact<Real>& contact : cluster.contacts) conclude(cluster, contact);
+    for (const std::size_t member : cluster.members) velocityChanged(bodies_[member]);
+    return true;
+  }
+
+  Cluster clusterAround(const Event& event) const {
+    Cluster cluster;
+    std::vector<std::size_t>& members = cluster.members;
+    std::vector<bool> is_member(bodies_.size(), false);
+    const auto join = [&](std::size_t index) {
+      if (!is_member[index]) members.push_back(index);
+      is_member[index] = true;
+    };
+    join(event.a);
+    if (!event.with_wall) join(event.b);
+    for (std::size_t k = 0; k < members.size(); ++k) {
+      const std::size_t a = members[k];
+      if (bodies_[a].w == 0) continue;  // a fixed ball hands nothing on
+      for (std::size_t b = 0; b < bodies_.size(); ++b) {
+        if (!is_member[b] && touching(a, b)) join(b);
+      }
+    }
+    std::sort(members.begin(), members.end());
+    for (const std::size_t member : members) {
+      cluster.bodies.push_back({bodies_[member].v, bodies_[member].w});
+    }
+    addContacts(cluster);
+    return cluster;
+  }
+
+  bool touching(std::size_t a, std::size_t b) const {
+    bool found = false;
+    forEachTouching(a, b, [&](const Vec&, Real) { found = true; });
+    return found;
+  }
+
+  // Calls f with the way from a to each image of b that it touches, and the gap.
+  template <class Function>
+  void forEachTouching(std::size_t a, std::size_t b, Function f) const {
+    using std::sqrt;
+    const Real reach = bodies_[a].radius + bodies_[b].radius;
+    const Real extent = std::max(extentOf(bodies_[a]), extentOf(bodies_[b]));
+    forEachImage(a, b, [&](const Vec& dx) {
+      const Real gap = sqrt(dot(dx, dx)) - reach;
+      if (touches(gap, reach, extent)) f(dx, gap);
+    });
+  }
+
+  // What a ball's place was last computed from: where it is, and how far it may have come.
+  Real extentOf(const Body& body) const {
+    return body.x.cwiseAbs().maxCoeff() + speedOf(body) * elapsed_;
+  }
+
+  void addContacts(Cluster& cluster) const {
+    for (std::size_t i = 0; i < cluster.members.size(); ++i) {
+      const Body& a = bodies_[cluster.members[i]];
+      for (std::size_t k = 0; k < walls_.size(); ++k) {
+        const Real gap = dot(a.x, walls_[k].normal) - walls_[k].offset - a.radius;
+        if (a.w == 0 || !touches(gap, a.radius, extentOf(a))) continue;
+        ClusterContact<Real> contact;
+        contact.a = i;
+        contact.wall = k;
+        contact.normal = -walls_[k].normal;
+        contact.gap = gap;
+        contact.reach = a.radius;
+        cluster.contacts.push_back(contact);
+      }
+      for (std::size_t j = i + 1; j < cluster.members.size(); ++j) {
+        const Body& b = bodies_[cluster.members[j]];
+        if (a.w == 0 && b.w == 0) continue;
+        forEachTouching(cluster.members[i], cluster.members[j], [&](const Vec& dx, Real gap) {
+          ClusterContact<Real> contact;
+          contact.a = i;
+          contact.b = j;
+          contact.normal = contactNormal<Real>(dx);
+          contact.gap = gap;
+          contact.reach = a.radius + b.radius;
+          contact.least_rebound =
+              leastRebound<Real>(dot(Vec(a.a - b.a), contact.normal), contact.reach);
+          cluster.contacts.push_back(contact);
+        });
+      }
+    }
+  }
+
+  // Tells the guard against collapse, once a ball, by its fastest contact. @return whether any ball
+  // is in a collapse
+  bool recordImpacts(const Cluster& cluster) {
+    if (surroundings_.restitution == 1) return false;
+    bool collapses = false;
+    for (std::size_t i = 0; i < cluster.members.size(); ++i) {
+      Body& body = bodies_[cluster.members[i]];
+      Real speed = 0;
+      Real reach = 0;
+      for (const ClusterContact<Real>& contact : cluster.contacts) {
+        if (contact.a != i && contact.b != i) continue;
+        if (contact.withWall() && dot(body.a, contact.normal) > 0) continue;  // it comes to rest
+        if (contact.approach_speed > speed) {
+          speed = contact.approach_speed;
+          reach = contact.reach;
+        }
+      }
+      if (speed > 0 && body.history.record(elapsed_, speed, reach)) collapses = true;
+    }
+    return collapses;
+  }
+
+  // Counts and reports a contact after its impact.
+  void conclude(const Cluster& cluster, const ClusterContact<Real>& contact) {
+    if (!(contact.impulse > 0)) return;
+    Body& a = bodies_[cluster.members[contact.a]];
+    noteOverlap(-contact.gap);
+    if (contact.withWall()) {
+      const Wall<Real>& wall = walls_[contact.wall];
+      if (comesToRest<Real>(dot(a.v, wall.normal), dot(a.a, wall.normal), a.radius)) {
+        a.resting.add(static_cast<int>(contact.wall));
+      }
+      ++statistics_.wall_collisions;
+      report(a, wall.partner, contact.normal, contact.impulse, contact.approach_speed);
+    } else {
+      ++statistics_.ball_collisions;
+      statistics_.virial += double(contact.impulse * contact.reach);
+      report(a, static_cast<Partner>(bodies_[cluster.members[contact.b]].id), contact.normal,
+             contact.impulse, contact.approach_speed);
+    }
   }
 
   static Real speedOf(const Body& body) {
@@ -355,11 +529,13 @@ class BruteForce final : public Method {
   }
 
   Surroundings surroundings_;
+  SimultaneousImpacts policy_;
   Vec gravity_;
   std::vector<Wall<Real>> walls_;
   std::vector<Body> bodies_;  // ids ascending
   Time base_;                 // now() is base_ + elapsed_
   Real elapsed_ = 0;          // s
+  OrderWatch<Real> watch_;
   Statistics statistics_;
   CollisionLog* log_ = nullptr;
 };

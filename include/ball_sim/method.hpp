@@ -47,8 +47,11 @@ struct Statistics {
   std::uint64_t events = 0;  ///< every event handled: collisions, cell crossings, stale ones, ...
   double virial = 0;         ///< J: sum over ball-ball impacts of impulse times distance of centres
   double deepest_overlap = 0;   ///< m: deepest overlap seen at any impact
+  double elastic_energy = 0;    ///< J: held by the springs of soft contacts now
   std::size_t queue_depth = 0;  ///< events that wait
   std::size_t bytes = 0;        ///< memory held for balls, cells and queue
+  /// Impacts at one instant whose outcome the policy (SimultaneousImpacts) decided.
+  std::uint64_t ambiguous_impacts = 0;
 };
 
 /// Moves a set of balls. Inputs are valid by contract: World checks what users give.
@@ -61,6 +64,9 @@ class Method {
 
   /// The method's name as scenes spell it.
   virtual const char* name() const = 0;
+
+  /// Why it is this one that moves the balls.
+  virtual std::string reason() const { return "asked for"; }
 
   /// Adds a ball at the present instant.
   /// @param id    not in use, and larger than all ids before it
@@ -101,6 +107,10 @@ class Method {
                                             std::optional<BallId> ignore) const = 0;
 
   virtual Statistics statistics() const = 0;
+
+  /// What the run asked of the method beyond its limits so far, as a sentence that names the limit
+  /// and the remedy; empty: nothing. What is beyond a limit for good makeMethod() refuses.
+  virtual std::string warning() const { return {}; }
 
   /// Reports each impact from now on; nullptr: none. The log must outlive the method or the call
   /// that takes it away.

@@ -18,8 +18,9 @@ enum class Precision { double_precision, long_double };
 /// How a method is to run. Each method takes what concerns it and leaves the rest.
 struct MethodSettings {
   Precision precision = Precision::double_precision;
-  double time_step = 1e-3;          ///< s, > 0, for the stepping methods
-  std::optional<double> tolerance;  ///< relative to a radius; absent: as exact as can be
+  double time_step = 1e-3;             ///< s, > 0, for the stepping methods
+  std::optional<double> tolerance;     ///< relative to a radius; absent: as exact as can be
+  std::optional<double> contact_time;  ///< s, > 0, of soft balls; absent: 50 time steps
   SimultaneousImpacts simultaneous_impacts = SimultaneousImpacts::sequential;
   unsigned threads = 1;  ///< >= 1; changes no bit of the result
 };
@@ -33,12 +34,19 @@ struct MethodChoice {
 /// The names a scene may use, `auto` first.
 const std::vector<std::string>& methodNames();
 
-/// Settles `auto`; any other name is taken as it is.
 /// @throws std::invalid_argument  an unknown name, listing the known ones
-MethodChoice chooseMethod(const std::string& name, const Scene& scene);
+void checkMethodName(const std::string& name);
+
+/// Settles `auto`; any other known name is taken as it is.
+/// @param balls  all balls of the scene, those that fill it too
+MethodChoice chooseMethod(const std::string& name, const Scene& scene,
+                          const std::vector<Ball>& balls);
+
+/// @throws std::invalid_argument  a time step, s, that is not finite or not above 0
+void checkTimeStep(double time_step);
 
 /// @param name  a known name other than `auto`
-/// @throws std::invalid_argument  an unknown name
+/// @throws std::invalid_argument  an unknown name; a time step the method can't go by
 std::unique_ptr<Method> makeMethod(const std::string& name, const Surroundings& surroundings,
                                    const MethodSettings& settings = {});
 

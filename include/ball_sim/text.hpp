@@ -12,6 +12,9 @@ namespace ball_sim::core {
 /// The shortest decimal text that reads back as the same double: "0.05", "-inf", "nan".
 std::string formatNumber(double value);
 
+/// About two digits, for sentences: "0.31", "120", "5.3e+06".
+std::string formatShort(double value);
+
 /// "(x, y, z)".
 std::string formatVector(const Vector3& vector);
 

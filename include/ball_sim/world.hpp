@@ -99,10 +99,12 @@ class World {
 
   const Scene& scene() const { return scene_; }  ///< with box extents filled in
   const Surroundings& surroundings() const { return scene_.surroundings; }
-  const MethodChoice& method() const { return choice_; }
+  /// The method at work now, and why; `auto` may change it as time goes on.
+  MethodChoice method() const { return {method_->name(), method_->reason()}; }
   Statistics statistics() const { return method_->statistics(); }
+  std::string warning() const { return method_->warning(); }  ///< see Method::warning()
   double kineticEnergy() const;    ///< J
-  double potentialEnergy() const;  ///< J
+  double potentialEnergy() const;  ///< J, of gravity and of soft contacts
   Vector3 momentum() const;        ///< kg m/s
 
   /// Reports impacts into `log` from now on, across resets; nullptr: none.
@@ -118,7 +120,7 @@ class World {
 
   Scene scene_;
   WorldOptions options_;
-  MethodChoice choice_;
+  MethodChoice choice_;        // of the start
   std::vector<Ball> initial_;  // the scene's balls, in order of id
   std::unique_ptr<Method> method_;
   std::vector<BallId> ids_;

@@ -298,8 +298,11 @@ void readMethod(const YamlField& root, Scene& scene) {
   }
   if (const auto impacts = root.find("simultaneous_impacts")) {
     const std::string policy = impacts->text();
-    if (policy == "simultaneous") impacts->fail("no method can do this yet: must be sequential");
-    if (policy != "sequential") impacts->fail("must be sequential");
+    if (policy == "simultaneous") {
+      scene.simultaneous_impacts = SimultaneousImpacts::simultaneous;
+    } else if (policy != "sequential") {
+      impacts->fail("must be sequential or simultaneous");
+    }
   }
 }
 

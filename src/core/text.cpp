@@ -1,6 +1,7 @@
 // Numbers as people write and read them.
 #include "ball_sim/text.hpp"
 
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <locale>
@@ -15,6 +16,13 @@ std::string formatNumber(double value) {
     std::snprintf(text, sizeof text, "%.*g", digits, value);
     if (std::strtod(text, nullptr) == value) break;
   }
+  return text;
+}
+
+std::string formatShort(double value) {
+  const double size = std::abs(value);
+  char text[32];
+  std::snprintf(text, sizeof text, size >= 100 && size < 1e5 ? "%.0f" : "%.2g", value);
   return text;
 }
 

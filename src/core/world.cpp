@@ -4,12 +4,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ball_sim/auto_method.hpp"
 #include "ball_sim/ball_check.hpp"
 #include "ball_sim/fill.hpp"
 #include "ball_sim/limits.hpp"
 #include "ball_sim/observables.hpp"
 #include "ball_sim/overlap_index.hpp"
 #include "ball_sim/text.hpp"
+#include "soft_sphere/contact_spring.hpp"
 
 namespace ball_sim::core {
 namespace {
@@ -57,16 +59,14 @@ Refusal unknownBall(const std::string& ids, bool several) {
 World::World(const Scene& scene, const WorldOptions& options) : scene_(scene), options_(options) {
   if (!options_.method.empty()) scene_.method = options_.method;
   if (options_.time_step) scene_.time_step = *options_.time_step;
-  if (!(scene_.time_step > 0) || !std::isfinite(scene_.time_step)) {
-    throw std::invalid_argument("time_step: " + formatNumber(scene_.time_step) +
-                                ": must be a finite number of seconds above 0");
-  }
-  choice_ = chooseMethod(scene_.method, scene_);
+  checkTimeStep(scene_.time_step);
+  checkMethodName(scene_.method);
   std::size_t count = scene_.balls.size();
   for (const Fill& fill : scene_.fill) count += fill.count;
   if (count > options_.max_balls) throw Refused(ballLimit(0, count, options_.max_balls));
   initial_ = populate(scene_);
   checkInitial(initial_, scene_.surroundings);
+  choice_ = chooseMethod(scene_.method, scene_, initial_);
   build(Time());
 }
 
@@ -75,9 +75,17 @@ void World::build(Time start) {
   settings.precision = options_.precision;
   settings.time_step = scene_.time_step;
   settings.tolerance = scene_.tolerance;
+  if (scene_.tolerance) {
+    settings.contact_time = contactTimeFor(*scene_.tolerance, initial_, scene_.surroundings);
+  }
   settings.simultaneous_impacts = scene_.simultaneous_impacts;
   settings.threads = options_.threads;
-  std::unique_ptr<Method> method = makeMethod(choice_.name, scene_.surroundings, settings);
+  std::unique_ptr<Method> method;
+  if (scene_.method == "auto") {
+    method = std::make_unique<AutoMethod>(scene_.surroundings, settings, choice_);
+  } else {
+    method = makeMethod(choice_.name, scene_.surroundings, settings);
+  }
   method->advanceTo(start);
   method_ = std::move(method);
   method_->setCollisionLog(log_);
@@ -269,7 +277,8 @@ double World::kineticEnergy() const {
 double World::potentialEnergy() const {
   BallStates states;
   read(states);
-  return core::potentialEnergy(states, masses_, surroundings().gravity);
+  return core::potentialEnergy(states, masses_, surroundings().gravity) +
+         statistics().elastic_energy;
 }
 
 Vector3 World::momentum() const {

@@ -1,7 +1,10 @@
 #include "simulator.hpp"
 
+#include <ros/console.h>
+
 #include <algorithm>
 
+#include "ball_sim/warnings.hpp"
 #include "conversions.hpp"
 
 namespace ball_sim {
@@ -49,7 +52,8 @@ Simulator::Simulator(const Parameters& parameters, core::World& world, Outputs& 
       states_(stateRate(parameters)),
       paused_(parameters.start_paused),
       clock_due_(parameters.clock_rate),
-      markers_due_(parameters.marker_rate) {
+      markers_due_(parameters.marker_rate),
+      method_(world.method().name) {
   collisions_.capacity = Outputs::kMaxCollisions;
   if (parameters.wait_for_viewer > 0 && !paused_) {
     viewer_wait_.emplace(outputs.markersTopic(), parameters.wait_for_viewer);
@@ -221,6 +225,7 @@ void Simulator::publishFrame(bool frame_ended) {
   }
   if (stats_due_.due(wall)) {
     outputs_.publishStats(stats(wall));
+    tellNews();
   }
   if (repeat_due_.due(wall)) {
     outputs_.repeatLatched();
@@ -239,6 +244,25 @@ void Simulator::listen() {
     listening_ = !listening_;
     world_.setCollisionLog(listening_ ? &collisions_ : nullptr);
   }
+}
+
+/// Logs a change of method, and once each what the user should know of scene and method.
+void Simulator::tellNews() {
+  const core::MethodChoice method = world_.method();
+  if (method.name != method_) {
+    ROS_INFO_STREAM("method " << method.name << " (" << method.reason << ")");
+    method_ = method.name;
+  }
+  warnOnce(core::policyWarning(world_), warned_of_policy_);
+  warnOnce(world_.warning(), warned_of_method_);
+}
+
+void Simulator::warnOnce(const std::string& warning, bool& warned) {
+  if (warned || warning.empty()) {
+    return;
+  }
+  ROS_WARN_STREAM(warning);
+  warned = true;
 }
 
 SimStats Simulator::stats(Clock::time_point wall) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <string>
 
 #include "ball_sim/world.hpp"
 #include "command_queue.hpp"
@@ -98,6 +99,8 @@ class Simulator {
   void publishFrame(bool frame_ended);
   void publishStates();
   void listen();
+  void tellNews();
+  static void warnOnce(const std::string& warning, bool& warned);
   SimStats stats(Clock::time_point wall);
   double energy() const { return world_.kineticEnergy() + world_.potentialEnergy(); }
 
@@ -129,6 +132,9 @@ class Simulator {
   bool moved_ = true;       // since the markers before
   bool changed_ = true;     // from outside
   bool population_ = true;  // changed from outside
+  std::string method_;      // the one last told of
+  bool warned_of_policy_ = false;
+  bool warned_of_method_ = false;
 
   // For ~stats.
   double reference_energy_ = 0;  // J, after the last change from outside

@@ -10,6 +10,7 @@
 
 #include "ball_sim/scene_reader.hpp"
 #include "ball_sim/text.hpp"
+#include "ball_sim/warnings.hpp"
 #include "ball_sim/world.hpp"
 #include "csv_files.hpp"
 #include "progress_bar.hpp"
@@ -159,11 +160,16 @@ void printSummary(const World& world, const RunRecord& record) {
       energyDrift(record.before, conservedIn(world)), counted.deepest_overlap);
 }
 
+void warn(const std::string& text) {
+  if (!text.empty()) std::fprintf(stderr, "ball_sim_run: warning: %s\n", text.c_str());
+}
+
 int runScene(const RunOptions& options) {
   WorldOptions world_options;
   world_options.method = options.method;
   world_options.time_step = options.time_step;
   world_options.precision = options.precision;
+  world_options.threads = options.threads;
   const Scene scene = readScene(options.scene);
   World world(scene, world_options);
   Outputs outputs(options);
@@ -182,6 +188,8 @@ int runScene(const RunOptions& options) {
     if (record.error.empty()) record.error = error.what();
   }
   world.setCollisionLog(nullptr);
+  warn(policyWarning(world));
+  warn(world.warning());
   if (!record.error.empty()) {
     std::fprintf(stderr, "ball_sim_run: could not go on at %s s: %s\n",
                  formatNumber(world.now().seconds()).c_str(), record.error.c_str());

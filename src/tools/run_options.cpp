@@ -2,6 +2,7 @@
 #include "run_options.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -16,6 +17,8 @@ namespace {
 
 // More states than that would fill any disk: the step is a slip.
 constexpr double kMostStates = 1e9;
+
+constexpr double kMostThreads = 1024;  // more is a slip too
 
 [[noreturn]] void refuse(const std::string& argument, const std::string& value,
                          const std::string& rule) {
@@ -50,6 +53,14 @@ Precision precisionOf(const std::string& argument, const std::string& value) {
   refuse(argument, value, "must be double or long_double");
 }
 
+unsigned threadCount(const std::string& argument, const std::string& value) {
+  const std::optional<double> number = parseDecimal(value);
+  if (!number || !(*number >= 1) || *number > kMostThreads || *number != std::floor(*number)) {
+    refuse(argument, value, "must be a whole number of threads, 1.." + formatNumber(kMostThreads));
+  }
+  return static_cast<unsigned>(*number);
+}
+
 using Setter = std::function<void(RunOptions&, const std::string& argument, const std::string&)>;
 
 // Options that take a value.
@@ -64,6 +75,7 @@ const std::map<std::string, Setter>& setters() {
       {"--events", [](RunOptions& o, Text a, Text v) { o.events = path(a, v); }},
       {"--stats", [](RunOptions& o, Text a, Text v) { o.stats = path(a, v); }},
       {"--precision", [](RunOptions& o, Text a, Text v) { o.precision = precisionOf(a, v); }},
+      {"--threads", [](RunOptions& o, Text a, Text v) { o.threads = threadCount(a, v); }},
   };
   return all;
 }
@@ -179,6 +191,9 @@ std::string helpText() {
          "  --stats FILE         writes statistics of the run as JSON\n"
          "  --precision P        arithmetic of the method: double (default) or long_double, "
          "slower\n"
+         "  --threads N          threads to share the work among, by methods that can "
+         "(continuous); 1\n"
+         "                       unless given. No bit of the result depends on it\n"
          "  --progress           shows progress on stderr even where that is no terminal\n"
          "  --version            prints the version\n"
          "  --help, -h           prints this\n"

@@ -28,6 +28,7 @@ struct RunOptions {
   std::string events;               ///< path of the impacts
   std::string stats;                ///< path of the statistics
   Precision precision = Precision::double_precision;
+  unsigned threads = 1;   ///< >= 1
   bool progress = false;  ///< even where there is no terminal
 };
 

@@ -88,6 +88,7 @@ std::string statisticsJson(const World& world, const RunRecord& record) {
        << "  \"ball_collisions\": " << counted.ball_collisions << ",\n"
        << "  \"wall_collisions\": " << counted.wall_collisions << ",\n"
        << "  \"events\": " << counted.events << ",\n"
+       << "  \"ambiguous_impacts\": " << counted.ambiguous_impacts << ",\n"
        << "  \"wall_seconds\": " << json(record.wall_seconds) << ",\n"
        << "  \"cpu_seconds\": " << json(record.cpu_seconds) << ",\n"
        << "  \"kinetic_energy_before\": " << json(record.before.kinetic_energy) << ",\n"

@@ -4,6 +4,7 @@
 #include <unistd.h>
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -145,6 +146,24 @@ TEST_F(BallSimRun, WritesStatistics) {
   EXPECT_TRUE(stats["error"].IsNull());
 }
 
+TEST_F(BallSimRun, WarnsOnceWhereThePolicyDecides) {
+  const auto row = [&](const std::string& name, int mass) {
+    return write(name,
+                 "balls:\n"
+                 "  - {position: [0, 0, 0], velocity: [1, 0, 0], radius: 0.5, mass: 1}\n"
+                 "  - {position: [1, 0, 0], radius: 0.5, mass: " +
+                     std::to_string(mass) +
+                     "}\n"
+                     "  - {position: [2, 0, 0], velocity: [-1, 0, 0], radius: 0.5, mass: 1}\n");
+  };
+  ASSERT_EQ(run(row("open.yaml", 2) + " --until 1 --stats " + file("s.json")), 0) << err_;
+  EXPECT_NE(err_.find("simultaneous_impacts is sequential"), std::string::npos) << err_;
+  EXPECT_EQ(std::count(err_.begin(), err_.end(), '\n'), 1) << err_;
+  EXPECT_GT(YAML::LoadFile(file("s.json"))["ambiguous_impacts"].as<int>(), 0);
+  ASSERT_EQ(run(row("settled.yaml", 1) + " --until 1"), 0) << err_;
+  EXPECT_EQ(err_, "") << "equal balls in a row need no policy";
+}
+
 TEST_F(BallSimRun, MeasuresCompressibility) {
   const std::string scene = write("s.yaml",
                                   "box: {min: [-.inf, -.inf, -.inf], max: [.inf, .inf, .inf]}\n"
@@ -175,6 +194,14 @@ TEST_F(BallSimRun, SameBitsAgainAndInPieces) {
                                                stats["wall_collisions"].as<std::size_t>());
 }
 
+TEST_F(BallSimRun, SameBitsWithAnyNumberOfThreads) {
+  const std::string scene = kScenes + "gas_3d.yaml --until 1 --method continuous --stats ";
+  ASSERT_EQ(run(scene + file("a.json")), 0) << err_;
+  ASSERT_EQ(run(scene + file("b.json") + " --threads 2"), 0) << err_;
+  EXPECT_EQ(YAML::LoadFile(file("a.json"))["state_hash"].as<std::string>(),
+            YAML::LoadFile(file("b.json"))["state_hash"].as<std::string>());
+}
+
 TEST_F(BallSimRun, TakesMethodAndPrecision) {
   ASSERT_EQ(run(kScenes +
                 "two_balls.yaml --until=10 --method brute_force --precision long_double "
@@ -198,8 +225,9 @@ TEST_F(BallSimRun, ShowsProgressOnlyWhenAsked) {
 TEST_F(BallSimRun, HelpIsComplete) {
   for (const char* option : {"--help", "-h"}) {
     ASSERT_EQ(run(option), 0);
-    for (const char* word : {"--until", "--method", "--time-step", "--every", "--out", "--events",
-                             "--stats", "--precision", "--progress", "-1 x-min", "Exit codes"}) {
+    for (const char* word :
+         {"--until", "--method", "--time-step", "--every", "--out", "--events", "--stats",
+          "--precision", "--threads", "--progress", "-1 x-min", "Exit codes"}) {
       EXPECT_NE(out_.find(word), std::string::npos) << word;
     }
   }
@@ -226,6 +254,10 @@ TEST_F(BallSimRun, RefusesBadArguments) {
       {scene + " --until 1 --every 0.1", "--every: 0.1: needs --out"},
       {scene + " --until 1 --method magic", "--method: magic: must be one of auto"},
       {scene + " --until 1 --precision half", "--precision: half: must be double or"},
+      {scene + " --until 1 --threads 0", "--threads: 0: must be a whole number of threads"},
+      {scene + " --until 1 --threads 1.5", "--threads: 1.5: must be"},
+      {scene + " --until 1 --threads many", "--threads: many: must be"},
+      {scene + " --until 1 --threads 1e9", "--threads: 1e9: must be"},
       {scene + " --until 1 --speed 3", "--speed: unknown: must be one of"},
       {scene + " --until 1 --progress=1", "--progress=1: unknown"},
       {scene + " --until 1 --out " + scene, "must not be the file given as SCENE.yaml"},

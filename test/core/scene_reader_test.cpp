@@ -251,11 +251,9 @@ INSTANTIATE_TEST_SUITE_P(Method, SceneMistake,
                                          Mistake{"time_step: 0", "1: time_step", "above 0"},
                                          Mistake{"time_step: .inf", "1: time_step", "above 0"},
                                          Mistake{"tolerance: -1", "1: tolerance", "above 0"},
-                                         Mistake{"simultaneous_impacts: simultaneous",
-                                                 "1: simultaneous_impacts",
-                                                 "no method can do this yet"},
                                          Mistake{"simultaneous_impacts: both",
-                                                 "1: simultaneous_impacts", "must be sequential"}));
+                                                 "1: simultaneous_impacts",
+                                                 "must be sequential or simultaneous"}));
 
 TEST(SceneReader, NamesFilesItCannotRead) {
   try {

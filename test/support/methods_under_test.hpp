@@ -19,12 +19,15 @@ constexpr const char* kSlowTwin = "brute_force";
 /// The methods that are exact to rounding and that this build has, the slow twin among them.
 inline std::vector<std::string> exactMethods() {
   std::vector<std::string> found;
-  for (const char* name : {kSlowTwin, "event_driven"}) {
+  for (const char* name : {kSlowTwin, "event_driven", "continuous"}) {
     const auto& known = methodNames();
     if (std::find(known.begin(), known.end(), name) != known.end()) found.push_back(name);
   }
   return found;
 }
+
+/// The methods that can take impacts of one instant together.
+inline std::vector<std::string> jointMethods() { return {kSlowTwin, "event_driven"}; }
 
 /// The exact methods fit for large cases: all but the slow twin.
 inline std::vector<std::string> fastMethods() {

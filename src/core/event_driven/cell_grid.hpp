@@ -16,13 +16,15 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
+#include <limits>
 #include <vector>
 
 #include "ball_sim/surroundings.hpp"
 #include "ball_sim/vector.hpp"
-#include "event_driven/event_queue.hpp"
 #include "event_driven/huge_page_vector.hpp"
+#include "event_driven/pair_search.hpp"
 
 namespace ball_sim::core {
 
@@ -30,87 +32,54 @@ namespace ball_sim::core {
 using CellCoordinates = std::array<std::int32_t, 3>;
 
 /// The place of a cell along Morton's space-filling curve (1966), which keeps near what is near.
-/// @param shift  the level's cells are 2^shift finest cells wide
-inline std::uint64_t mortonKey(const CellCoordinates& c, int shift) {
+inline std::uint64_t mortonKey(const CellCoordinates& c) {
   std::uint64_t key = 0;
   for (int bit = 0; bit < 21; ++bit) {
     for (int axis = 0; axis < 3; ++axis) {
-      const auto coordinate = static_cast<std::uint32_t>(c[static_cast<std::size_t>(axis)])
-                              << shift;
+      const auto coordinate = static_cast<std::uint32_t>(c[static_cast<std::size_t>(axis)]);
       key |= std::uint64_t{(coordinate >> bit) & 1} << (3 * bit + axis);
     }
   }
   return key;
 }
 
-/// Images of a periodic box, as a number of three base-3 digits; kHomeImage: not shifted at all.
-using Image = std::uint32_t;
-constexpr Image kHomeImage = 13;
-
 /// The adjacent cells of one cell along one axis: lower, itself, upper.
 struct AxisNeighbours {
-  static constexpr std::uint32_t kNone = ~std::uint32_t{0};
-
-  std::array<std::uint32_t, 3> cell = {kNone, kNone, kNone};  ///< part of the cell's index
-  std::array<Image, 3> image = {0, 0, 0};                     ///< digit of the image, in place
-  std::uint8_t begin = 1;                                     ///< first that is not kNone
-  std::uint8_t end = 2;                                       ///< behind the last
-  bool wraps = false;                                         ///< some image is not at home
-  bool inside = false;  ///< the neighbours lie where they lie for most cells: no edge is near
+  std::array<std::uint32_t, 3> cell{};  ///< part of the cell's index
+  std::uint8_t begin = 1;               ///< first that there is
+  std::uint8_t end = 2;                 ///< behind the last
 };
 
-/// The balls found near a ball, with the image each was found in.
+/// The balls found near a ball.
 struct Candidates {
   std::vector<Slot> slots;
-  std::vector<Image> images;
   std::size_t count = 0;
-  bool wraps = false;  ///< some image is not kHomeImage
-
-  void clear() {
-    count = 0;
-    wraps = false;
-  }
-
-  /// From here on images differ; those found so far are at home.
-  void wrap() {
-    if (!wraps) std::fill_n(images.begin(), count, kHomeImage);
-    wraps = true;
-  }
 
   /// Makes room for `more` beyond `count`.
   void reserve(std::size_t more) {
-    if (slots.size() >= count + more) return;
-    slots.resize(2 * (count + more));
-    images.resize(2 * (count + more));
+    if (slots.size() < count + more) slots.resize(2 * (count + more));
   }
 
-  void add(Slot slot, Image image) {
+  void add(Slot slot) {
     reserve(1);
-    slots[count] = slot;
-    images[count++] = image;
+    slots[count++] = slot;
+  }
+
+  /// Ends the list as PairSearch wants it: what follows are slots that there are.
+  void close() {
+    reserve(kSearchStep);
+    std::fill_n(slots.begin() + static_cast<std::ptrdiff_t>(count), kSearchStep, Slot{0});
   }
 };
 
 /// The balls in one cell: the first few beside each other, so that they are copied without a
 /// branch on how many there are.
 struct alignas(16) Cell {
-  static constexpr std::uint32_t kInPlace = 3;
+  static constexpr std::uint32_t kInPlace = 3;  // all bits set
 
   /// Beyond three balls the last of these is the head of a chain that holds the third and later.
   std::array<Slot, kInPlace> slots = {kNoSlot, kNoSlot, kNoSlot};
   std::uint32_t count = 0;
-};
-
-/// Some cells around a cell, as indices or as offsets to an index, and the images they stand for.
-struct CellList {
-  std::array<std::uint32_t, 27> cell{};
-  std::array<Image, 27> image{};
-  std::size_t count = 0;
-
-  void add(std::uint32_t c, Image i) {
-    cell[count] = c;
-    image[count++] = i;
-  }
 };
 
 /// One level of cells, and who is in them.
@@ -122,15 +91,13 @@ class CellLevel {
             const std::array<bool, 3>& periodic, const std::array<bool, 3>& open)
       : depth_(depth) {
     std::uint32_t stride = 1;
-    Image digit = 1;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       mask_[axis] = open[axis] ? static_cast<std::int32_t>(counts[axis]) - 1 : -1;
-      neighbours_[axis] = axisNeighbours(counts[axis], periodic[axis], open[axis], stride, digit);
-      stride *= counts[axis];
-      digit *= 3;
+      neighbours_[axis] = axisNeighbours(counts[axis], periodic[axis] || open[axis], stride);
+      // A row has one cell more, always empty: the neighbour along x where there is none.
+      stride *= axis == 0 ? counts[axis] + 1 : counts[axis];
     }
     cells_.resize(stride);
-    listOffsets(counts, periodic);
   }
 
   int depth() const { return depth_; }
@@ -207,42 +174,27 @@ class CellLevel {
     }
   }
 
-  /// Adds the members of the 27 cells around `c`, or of the layer of them at `direction` (0 lower,
-  /// 2 upper) of `axis`; and the guests there if `with_guests`.
-  void gather(const CellCoordinates& c, std::size_t axis, std::size_t direction, bool with_guests,
-              Candidates& candidates) const {
+  /// Adds the members of the 27 cells around `c`, and the guests there if `with_guests`.
+  void gather(const CellCoordinates& c, bool with_guests, Candidates& candidates) const {
+    const auto& x = neighbours(0, c[0]).cell;
+    gatherRows<3>(x.data(), sideOf(neighbours(1, c[1])), sideOf(neighbours(2, c[2])), with_guests,
+                  candidates);
+  }
+
+  /// The same of their layer at `direction` (0 lower, 2 upper) of `axis` alone.
+  void gatherLayer(const CellCoordinates& c, std::size_t axis, std::size_t direction,
+                   bool with_guests, Candidates& candidates) const {
     const AxisNeighbours& x = neighbours(0, c[0]);
     const AxisNeighbours& y = neighbours(1, c[1]);
     const AxisNeighbours& z = neighbours(2, c[2]);
-    candidates.reserve(kMostInPlace);
-    const bool around = axis == kAllAround;
-    if (x.inside && y.inside && z.inside) {
-      const std::uint32_t middle = x.cell[1] + y.cell[1] + z.cell[1];
-      const CellList& offsets = around ? around_ : layers_[2 * axis + direction / 2];
-      if (candidates.wraps) {
-        gatherCells<true>(middle, offsets, offsets.count, candidates);
-      } else if (offsets.count == 27) {  // the usual case, unrolled
-        gatherCells<false>(middle, offsets, 27, candidates);
-      } else {
-        gatherCells<false>(middle, offsets, offsets.count, candidates);
-      }
-      if (with_guests) gatherGuests(middle, offsets, candidates);
-      return;
-    }
-    const CellList list = listAtEdge({&x, &y, &z}, axis, direction);
-    if (x.wraps || y.wraps || z.wraps) candidates.wrap();
-    if (candidates.wraps) {
-      gatherCells<true>(0, list, list.count, candidates);
+    if (axis == 0) {
+      gatherRows<1>(&x.cell[direction], sideOf(y), sideOf(z), with_guests, candidates);
+    } else if (axis == 1) {
+      gatherRows<3>(x.cell.data(), layerOf(y, direction), sideOf(z), with_guests, candidates);
     } else {
-      gatherCells<false>(0, list, list.count, candidates);
+      gatherRows<3>(x.cell.data(), sideOf(y), layerOf(z, direction), with_guests, candidates);
     }
-    if (with_guests) gatherGuests(0, list, candidates);
   }
-
-  static constexpr std::size_t kAllAround = 3;  // no axis
-
-  // What 27 cells are copied to, their counts included.
-  static constexpr std::size_t kMostInPlace = 27 * sizeof(Cell) / sizeof(Slot);
 
   std::size_t bytes() const {
     std::size_t bytes =
@@ -253,116 +205,81 @@ class CellLevel {
   }
 
  private:
-  // Where the neighbours of a cell lie that no edge is near, as offsets.
-  void listOffsets(const std::array<std::uint32_t, 3>& counts,
-                   const std::array<bool, 3>& periodic) {
-    const auto steps = [&](std::size_t axis) {
-      return counts[axis] == 1 && !periodic[axis] ? std::vector<int>{0}
-                                                  : std::vector<int>{-1, 0, 1};
-    };
-    const auto width = static_cast<std::int64_t>(counts[0]);
-    const auto area = width * static_cast<std::int64_t>(counts[1]);
-    for (const int z : steps(2)) {
-      for (const int y : steps(1)) {
-        for (const int x : steps(0)) {
-          const auto offset = static_cast<std::uint32_t>(x + width * y + area * z);
-          around_.add(offset, kHomeImage);
-          const std::array<int, 3> step = {x, y, z};
-          for (std::size_t axis = 0; axis < 3; ++axis) {
-            if (step[axis] < 0) layers_[2 * axis].add(offset, kHomeImage);
-            if (step[axis] > 0) layers_[2 * axis + 1].add(offset, kHomeImage);
-          }
-        }
-      }
-    }
+  // Cells along one axis, as parts of indices: from one, up to another.
+  struct Side {
+    const std::uint32_t* begin;
+    const std::uint32_t* end;
+  };
+
+  static Side sideOf(const AxisNeighbours& near) {
+    return {near.cell.data() + near.begin, near.cell.data() + near.end};
+  }
+  static Side layerOf(const AxisNeighbours& near, std::size_t direction) {
+    const bool is_there = near.begin <= direction && direction < near.end;
+    return {near.cell.data() + direction, near.cell.data() + direction + (is_there ? 1 : 0)};
   }
 
-  static CellList listAtEdge(const std::array<const AxisNeighbours*, 3>& near, std::size_t axis,
-                             std::size_t direction) {
-    std::array<std::size_t, 3> from{};
-    std::array<std::size_t, 3> to{};
-    CellList list;
-    for (std::size_t k = 0; k < 3; ++k) {
-      from[k] = k == axis ? direction : near[k]->begin;
-      to[k] = k == axis ? direction + 1 : near[k]->end;
-      if (k == axis && near[k]->cell[direction] == AxisNeighbours::kNone) return list;
-    }
-    for (std::size_t k = from[2]; k < to[2]; ++k) {
-      for (std::size_t j = from[1]; j < to[1]; ++j) {
-        const std::uint32_t row = near[2]->cell[k] + near[1]->cell[j];
-        const Image row_image = near[2]->image[k] + near[1]->image[j];
-        for (std::size_t i = from[0]; i < to[0]; ++i) {
-          list.add(row + near[0]->cell[i], row_image + near[0]->image[i]);
-        }
-      }
-    }
-    return list;
-  }
+  // What 27 cells are copied to, their counts included.
+  static constexpr std::size_t kMostInPlace = 27 * sizeof(Cell) / sizeof(Slot);
 
-  template <bool kWraps>
-  inline __attribute__((always_inline)) void gatherCells(std::uint32_t middle, const CellList& list,
-                                                         std::size_t number,
-                                                         Candidates& candidates) const {
-    Slot* slots = candidates.slots.data();
-    Image* images = candidates.images.data();
-    const Cell* cells = cells_.data();
-    std::size_t count = candidates.count;
-    for (std::size_t i = 0; i < number; ++i) {
-      // Offsets may be negative: the sum is meant modulo 2^32.
-      const Cell& cell = cells[static_cast<std::uint32_t>(middle + list.cell[i])];
-      // One copy of the whole cell; what is too much is overwritten by the next.
-      std::memcpy(slots + count, &cell, sizeof(Cell));
-      if constexpr (kWraps) {
-        const Image image = list.image[i];
-        const std::array<Image, 4> same = {image, image, image, image};
-        std::memcpy(images + count, &same, sizeof(same));
-      }
-      if (__builtin_expect(cell.count <= Cell::kInPlace, 1)) {
-        count += cell.count;
-      } else {
-        candidates.count = count + Cell::kInPlace;
-        gatherChain(cell, list.image[i], candidates);
-        slots = candidates.slots.data();
-        images = candidates.images.data();
-        count = candidates.count;
-      }
-    }
-    candidates.count = count;
-  }
-
-  void gatherGuests(std::uint32_t middle, const CellList& list, Candidates& candidates) const {
-    for (std::size_t i = 0; i < list.count; ++i) {
-      Slot s = guests_[static_cast<std::uint32_t>(middle + list.cell[i])];
-      for (; s != kNoSlot; s = next_[s]) candidates.add(s, list.image[i]);
-    }
-  }
-
-  void gatherChain(const Cell& cell, Image image, Candidates& candidates) const {
-    for (Slot s = next_[cell.slots[2]]; s != kNoSlot; s = next_[s]) candidates.add(s, image);
+  template <std::size_t kColumns>
+  void gatherRows(const std::uint32_t* columns, Side ys, Side zs, bool with_guests,
+                  Candidates& candidates) const {
     candidates.reserve(kMostInPlace);
+    std::array<std::uint32_t, kColumns> x;
+    std::copy_n(columns, kColumns, x.begin());
+    Slot* const begin = candidates.slots.data() + candidates.count;
+    Slot* at = begin;
+    std::uint32_t fullest = 0;
+    for (const std::uint32_t* z = zs.begin; z != zs.end; ++z) {
+      for (const std::uint32_t* y = ys.begin; y != ys.end; ++y) {
+        const Cell* const row = &cells_[*z + *y];
+        for (std::size_t i = 0; i < kColumns; ++i) {
+          const Cell& cell = row[x[i]];
+          // One copy of the whole cell; what is too much is overwritten by the next.
+          std::memcpy(at, &cell, sizeof(Cell));
+          at += std::min(cell.count, Cell::kInPlace);
+          fullest |= cell.count;  // beyond kInPlace as soon as one is
+        }
+      }
+    }
+    candidates.count += static_cast<std::size_t>(at - begin);
+    if (fullest <= Cell::kInPlace && !with_guests) return;
+    for (const std::uint32_t* z = zs.begin; z != zs.end; ++z) {
+      for (const std::uint32_t* y = ys.begin; y != ys.end; ++y) {
+        for (std::size_t i = 0; i < kColumns; ++i) {
+          const std::uint32_t cell = *z + *y + x[i];
+          if (cells_[cell].count > Cell::kInPlace) gatherChain(cells_[cell], candidates);
+          if (with_guests) gatherGuests(cell, candidates);
+        }
+      }
+    }
+  }
+
+  void gatherGuests(std::uint32_t cell, Candidates& candidates) const {
+    for (Slot s = guests_[cell]; s != kNoSlot; s = next_[s]) candidates.add(s);
+  }
+
+  // What a cell holds beyond the first few.
+  void gatherChain(const Cell& cell, Candidates& candidates) const {
+    for (Slot s = next_[cell.slots[2]]; s != kNoSlot; s = next_[s]) candidates.add(s);
   }
 
   void dropLast(Cell& cell, std::uint32_t last) {
     cell.slots[last] = last == 2 ? next_[cell.slots[2]] : kNoSlot;
   }
 
-  static std::vector<AxisNeighbours> axisNeighbours(std::uint32_t count, bool periodic, bool open,
-                                                    std::uint32_t stride, Image digit) {
+  // On an axis of one or two cells that wraps the neighbours are cells already listed.
+  static std::vector<AxisNeighbours> axisNeighbours(std::uint32_t count, bool wraps,
+                                                    std::uint32_t stride) {
     std::vector<AxisNeighbours> table(count);
     for (std::uint32_t c = 0; c < count; ++c) {
       AxisNeighbours& near = table[c];
-      near.cell[1] = c * stride;
-      near.image = {digit, digit, digit};
-      // On an open axis of one or two cells the neighbours are cells already listed.
-      const bool wraps = periodic || (open && count > 2);
-      if (c > 0 || wraps) near.cell[0] = (c > 0 ? c - 1 : count - 1) * stride;
-      if (c + 1 < count || wraps) near.cell[2] = (c + 1 < count ? c + 1 : 0) * stride;
-      near.begin = near.cell[0] == AxisNeighbours::kNone ? 1 : 0;
-      near.end = near.cell[2] == AxisNeighbours::kNone ? 2 : 3;
-      if (periodic && c == 0) near.image[0] = 0;
-      if (periodic && c + 1 == count) near.image[2] = 2 * digit;
-      near.wraps = periodic && (c == 0 || c + 1 == count);
-      near.inside = (c > 0 && c + 1 < count) || (count == 1 && !periodic);
+      near.begin = c > 0 || (wraps && count > 2) ? 0 : 1;
+      near.end = c + 1 < count || (wraps && count > 2) ? 3 : 2;
+      near.cell = {count * stride, c * stride, count * stride};  // where none is: the empty cell
+      if (near.begin == 0) near.cell[0] = (c > 0 ? c - 1 : count - 1) * stride;
+      if (near.end == 3) near.cell[2] = (c + 1 < count ? c + 1 : 0) * stride;
     }
     return table;
   }
@@ -370,9 +287,7 @@ class CellLevel {
   int depth_;
   std::array<std::int32_t, 3> mask_{};  // of coordinates on open axes; all ones elsewhere
   std::array<std::vector<AxisNeighbours>, 3> neighbours_;
-  HugePageVector<Cell> cells_;      // members
-  CellList around_;                 // offsets of the neighbours of a cell inside
-  std::array<CellList, 6> layers_;  // and of those on each side: lower x, upper x, lower y, ...
+  HugePageVector<Cell> cells_;  // members
   std::vector<Slot> guests_;    // heads of the lists of balls of finer levels; empty without any
   std::vector<Slot> next_;      // in a cell's chain, or a list of guests
   std::vector<Slot> previous_;  // in a list of guests
@@ -392,6 +307,16 @@ struct GridAxis {
   bool open() const { return !periodic && !flat && !(lower_wall && upper_wall); }
 };
 
+/// Cubes on a lattice: the cells of a level, or the regions around homes.
+template <class Real>
+struct Lattice {
+  std::array<Real, 3> first{};    ///< m, middle of the cube at coordinate 0
+  std::array<Real, 3> spacing{};  ///< m
+  std::array<Real, 3> half{};     ///< m, half the edge of a cube
+  /// Coordinates, along each axis, of the cubes that have no way out towards lower and upper.
+  std::array<std::array<std::int32_t, 2>, 3> end{};
+};
+
 /// All levels, and the geometry they share.
 template <class Real>
 class CellGrid {
@@ -409,19 +334,38 @@ class CellGrid {
       levels_.emplace_back(depth, counts, periodic, open);
     }
     for (std::size_t i = 0; i + 1 < levels_.size(); ++i) levels_[i].expectGuests();
-    for (const CellLevel& level : levels_) {
-      using std::ldexp;
-      edges_.push_back({ldexp(axes[0].edge, -level.depth()), ldexp(axes[1].edge, -level.depth()),
-                        ldexp(axes[2].edge, -level.depth())});
+    for (std::size_t level = 0; level < levels_.size(); ++level) {
+      lattices_.push_back(lattice(levels_[level].depth()));
+      for (std::size_t k = 0; k < 3; ++k) {
+        if (axes_[k].lower_wall) lattices_[level].end[k][0] = 0;
+        if (axes_[k].upper_wall) lattices_[level].end[k][1] = count(k, level) - 1;
+      }
     }
   }
+
+  /// Cells whose edges are halved `depth` times. Only flat axes have ends.
+  Lattice<Real> lattice(int depth) const {
+    using std::ldexp;
+    Lattice<Real> lattice;
+    for (std::size_t k = 0; k < 3; ++k) {
+      lattice.spacing[k] = ldexp(axes_[k].edge, -depth);
+      lattice.half[k] = lattice.spacing[k] / 2;
+      lattice.first[k] = axes_[k].origin + lattice.half[k];
+      if (axes_[k].flat) continue;
+      lattice.end[k] = {std::numeric_limits<std::int32_t>::min(),
+                        std::numeric_limits<std::int32_t>::max()};
+    }
+    return lattice;
+  }
+
+  const Lattice<Real>& latticeOf(std::size_t level) const { return lattices_[level]; }
 
   const GridAxis<Real>& axis(std::size_t k) const { return axes_[k]; }
   std::vector<CellLevel>& levels() { return levels_; }
   const std::vector<CellLevel>& levels() const { return levels_; }
 
   /// Edge of a cell, m.
-  Real edge(std::size_t axis, std::size_t level) const { return edges_[level][axis]; }
+  Real edge(std::size_t axis, std::size_t level) const { return lattices_[level].spacing[axis]; }
 
   /// Number of cells from end to end of a bounded axis.
   std::int32_t count(std::size_t axis, std::size_t level) const {
@@ -431,26 +375,38 @@ class CellGrid {
   /// Whether a box face bounds the cells at a coordinate, towards `direction` (-1 or +1).
   bool isWall(std::size_t axis, std::size_t level, std::int32_t coordinate, int direction) const {
     if (direction < 0) return axes_[axis].lower_wall && coordinate == 0;
-    return axes_[axis].upper_wall && coordinate == count(axis, level) - 1;
+    return axes_[axis].upper_wall && coordinate == lattices_[level].end[axis][1];
   }
 
-  CellCoordinates coordinatesOf(const VectorOf<Real>& x, std::size_t level) const {
+  /// The cell around a place, in cells whose edges are halved `depth` times.
+  CellCoordinates coordinatesOf(const VectorOf<Real>& x, int depth) const {
     using std::floor;
+    using std::ldexp;
     CellCoordinates c{};
     for (std::size_t k = 0; k < 3; ++k) {
-      if (axes_[k].flat) continue;
-      const Real cell = floor((x[static_cast<int>(k)] - axes_[k].origin) / edge(k, level));
-      c[k] = static_cast<std::int32_t>(cell);
-      if (axes_[k].lower_wall || axes_[k].periodic) c[k] = std::max(c[k], 0);
-      if (axes_[k].upper_wall || axes_[k].periodic) c[k] = std::min(c[k], count(k, level) - 1);
+      const GridAxis<Real>& axis = axes_[k];
+      if (axis.flat) continue;
+      const Real edge = ldexp(axis.edge, -depth);
+      c[k] = static_cast<std::int32_t>(floor((x[static_cast<int>(k)] - axis.origin) / edge));
+      const auto last = static_cast<std::int32_t>(axis.cells << depth) - 1;
+      if (axis.lower_wall || axis.periodic) c[k] = std::max(c[k], 0);
+      if (axis.upper_wall || axis.periodic) c[k] = std::min(c[k], last);
     }
     return c;
   }
 
-  /// The same cell of `level` in the coordinates of a coarser one.
-  CellCoordinates coarser(const CellCoordinates& c, std::size_t level, std::size_t coarse) const {
-    const int shift = levels_[level].depth() - levels_[coarse].depth();
+  /// The same cell in the coordinates of a lesser depth.
+  static CellCoordinates coarser(const CellCoordinates& c, int depth, int lesser) {
+    const int shift = depth - lesser;
     return {c[0] >> shift, c[1] >> shift, c[2] >> shift};
+  }
+
+  /// Cells between two coordinates along one axis, of cells whose edges are halved `depth` times;
+  /// the short way round where the axis is periodic.
+  std::int32_t cellsBetween(std::size_t axis, std::int32_t a, std::int32_t b, int depth) const {
+    const std::int32_t cells = std::abs(a - b);
+    if (!axes_[axis].periodic) return cells;
+    return std::min(cells, static_cast<std::int32_t>(axes_[axis].cells << depth) - cells);
   }
 
   void resize(std::size_t slots) {
@@ -461,14 +417,14 @@ class CellGrid {
   void link(Slot slot, const CellCoordinates& coordinates, std::size_t level) {
     levels_[level].link(slot, levels_[level].cellIndex(coordinates));
     for (std::size_t m = 0; m < level; ++m) {
-      levels_[m].linkGuest(slot, levels_[m].cellIndex(coarser(coordinates, level, m)));
+      levels_[m].linkGuest(slot, levels_[m].cellIndex(inLevel(coordinates, level, m)));
     }
   }
 
   void unlink(Slot slot, const CellCoordinates& coordinates, std::size_t level) {
     levels_[level].unlink(slot, levels_[level].cellIndex(coordinates));
     for (std::size_t m = 0; m < level; ++m) {
-      levels_[m].unlinkGuest(slot, levels_[m].cellIndex(coarser(coordinates, level, m)));
+      levels_[m].unlinkGuest(slot, levels_[m].cellIndex(inLevel(coordinates, level, m)));
     }
   }
 
@@ -477,8 +433,8 @@ class CellGrid {
     levels_[level].unlink(slot, levels_[level].cellIndex(from));
     levels_[level].link(slot, levels_[level].cellIndex(to));
     for (std::size_t m = 0; m < level; ++m) {
-      const std::uint32_t before = levels_[m].cellIndex(coarser(from, level, m));
-      const std::uint32_t after = levels_[m].cellIndex(coarser(to, level, m));
+      const std::uint32_t before = levels_[m].cellIndex(inLevel(from, level, m));
+      const std::uint32_t after = levels_[m].cellIndex(inLevel(to, level, m));
       if (before == after) continue;
       levels_[m].unlinkGuest(slot, before);
       levels_[m].linkGuest(slot, after);
@@ -489,24 +445,29 @@ class CellGrid {
   /// itself included.
   void gatherNear(const CellCoordinates& coordinates, std::size_t level,
                   Candidates& candidates) const {
-    candidates.clear();
+    candidates.count = 0;
     for (std::size_t m = 0; m <= level; ++m) {
-      gatherAt(m, coarser(coordinates, level, m), CellLevel::kAllAround, 0, m == level, candidates);
+      levels_[m].gather(inLevel(coordinates, level, m), m == level && levels_[m].hasGuests(),
+                        candidates);
     }
+    candidates.close();
   }
 
-  /// The same, but only the layer of cells that came near by a crossing along `axis` towards
-  /// `direction` (0 lower, 2 upper), on the levels where cells were crossed at all.
+  /// The same, but only the layer of cells that came near by a crossing along `axis`, on the levels
+  /// where cells were crossed at all.
   /// @param unwrapped  the coordinates after the crossing, `after` before it was put back into the
   ///                   periodic box
   void gatherNewLayer(const CellCoordinates& before, const CellCoordinates& unwrapped,
                       const CellCoordinates& after, std::size_t level, std::size_t axis,
-                      std::size_t direction, Candidates& candidates) const {
-    candidates.clear();
+                      Candidates& candidates) const {
+    candidates.count = 0;
+    const std::size_t direction = unwrapped[axis] > before[axis] ? 2 : 0;
     for (std::size_t m = 0; m <= level; ++m) {
-      if (coarser(unwrapped, level, m)[axis] == coarser(before, level, m)[axis]) continue;
-      gatherAt(m, coarser(after, level, m), axis, direction, m == level, candidates);
+      if (inLevel(unwrapped, level, m)[axis] == inLevel(before, level, m)[axis]) continue;
+      levels_[m].gatherLayer(inLevel(after, level, m), axis, direction,
+                             m == level && levels_[m].hasGuests(), candidates);
     }
+    candidates.close();
   }
 
   /// Fetches the cells around a ball from memory.
@@ -521,14 +482,13 @@ class CellGrid {
   }
 
  private:
-  void gatherAt(std::size_t level, const CellCoordinates& c, std::size_t axis,
-                std::size_t direction, bool own, Candidates& candidates) const {
-    levels_[level].gather(c, axis, direction, own && levels_[level].hasGuests(), candidates);
+  CellCoordinates inLevel(const CellCoordinates& c, std::size_t level, std::size_t coarse) const {
+    return coarser(c, levels_[level].depth(), levels_[coarse].depth());
   }
 
   std::array<GridAxis<Real>, 3> axes_;
-  std::vector<CellLevel> levels_;           // coarsest first
-  std::vector<std::array<Real, 3>> edges_;  // m, by level and axis
+  std::vector<CellLevel> levels_;        // coarsest first
+  std::vector<Lattice<Real>> lattices_;  // by level
 };
 
 }  // namespace ball_sim::core

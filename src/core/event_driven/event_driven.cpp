@@ -4,14 +4,16 @@
 
 namespace ball_sim::core {
 
-std::unique_ptr<Method> makeEventDriven(const Surroundings& surroundings, Precision precision) {
+std::unique_ptr<Method> makeEventDriven(const Surroundings& surroundings,
+                                        const MethodSettings& settings) {
   const bool falls = surroundings.gravity != Vector3::Zero();
-  if (precision == Precision::long_double) {
-    if (falls) return std::make_unique<EventDriven<long double, true>>(surroundings);
-    return std::make_unique<EventDriven<long double, false>>(surroundings);
+  const SimultaneousImpacts policy = settings.simultaneous_impacts;
+  if (settings.precision == Precision::long_double) {
+    if (falls) return std::make_unique<EventDriven<long double, true>>(surroundings, policy);
+    return std::make_unique<EventDriven<long double, false>>(surroundings, policy);
   }
-  if (falls) return std::make_unique<EventDriven<double, true>>(surroundings);
-  return std::make_unique<EventDriven<double, false>>(surroundings);
+  if (falls) return std::make_unique<EventDriven<double, true>>(surroundings, policy);
+  return std::make_unique<EventDriven<double, false>>(surroundings, policy);
 }
 
 }  // namespace ball_sim::core

@@ -1,16 +1,20 @@
 // Method event_driven: hard-sphere event-driven dynamics. Nothing happens between impacts, so only
 // impacts are computed, in order of time, each exact to rounding.
 //
-// Every ball holds its own next event (an impact with a ball or wall, or the crossing into another
-// cell) and sits once in the queue. An impact found with a partner that has meanwhile changed is
-// noticed when it comes up (the partner's version tells) and searched again. A ball's place is
-// stored at its own last change and nowhere else: reading, crossing and searching leave no trace in
-// the trajectory.
+// Every ball holds its own next event (an impact with a ball or wall, or the way out of its cell)
+// and sits once in the queue. An impact found with a partner that has meanwhile changed is noticed
+// when it comes up (the partner's version tells) and searched again. A ball's place is stored at
+// its own last change and nowhere else: reading, crossing and searching leave no trace in the
+// trajectory.
+//
+// Who is near is told by cells where balls fly far between impacts, and by neighbour lists where
+// they rattle among the same neighbours (see wantsLists()).
 //
 // Gets right: everything hard and elastic or dissipative, any masses and radii, walls, gravity,
 // at any speed: no impact is missed, none is seen twice. Misses: contact that lasts. A ball comes
 // to rest on walls; a ball on another ball keeps bouncing, ever lower, down to a hum of 1e-6 of
-// their radii. Simultaneous impacts are taken one after the other, by the smaller ids first.
+// their radii. Impacts at one instant are taken one after the other, by the smaller ids first, or
+// together (simultaneous_impacts.hpp).
 // Limits: 2^27 balls; 2^30 cells from the origin of an open scene.
 #pragma once
 
@@ -26,13 +30,18 @@
 #include "ball_sim/collapse_guard.hpp"
 #include "ball_sim/collision_law.hpp"
 #include "ball_sim/method.hpp"
+#include "ball_sim/scene.hpp"
+#include "ball_sim/simultaneous_impacts.hpp"
 #include "ball_sim/time_of_impact.hpp"
 #include "ball_sim/walls.hpp"
 #include "event_driven/cell_grid.hpp"
+#include "event_driven/contacts.hpp"
 #include "event_driven/event_queue.hpp"
 #include "event_driven/grid_layout.hpp"
 #include "event_driven/huge_page_vector.hpp"
-#include "event_driven/pair_batch.hpp"
+#include "event_driven/neighbour_lists.hpp"
+#include "event_driven/pair_search.hpp"
+#include "impact.hpp"
 
 namespace ball_sim::core {
 
@@ -43,15 +52,18 @@ class EventDriven final : public Method {
   using Vec = VectorOf<Real>;
 
  public:
-  explicit EventDriven(const Surroundings& surroundings)
+  explicit EventDriven(const Surroundings& surroundings,
+                       SimultaneousImpacts policy = SimultaneousImpacts::sequential)
       : surroundings_(surroundings),
-        gravity_(surroundings.gravity.cast<Real>()),
+        policy_(policy),
         restitution_(Real(surroundings.restitution)),
-        walls_(wallsOf<Real>(surroundings)) {
+        walls_(wallsOf<Real>(surroundings)),
+        contacts_(surroundings.gravity.cast<Real>()),
+        queue_(agendas_) {
     for (std::size_t k = 0; k < walls_.size(); ++k) {
       const Partner partner = walls_[k].partner;
       if (partner > planePartner(0)) {
-        face_walls_[static_cast<std::size_t>(-1 - partner)] = static_cast<std::int32_t>(k);
+        face_walls_[static_cast<std::size_t>(-1 - partner)] = static_cast<std::uint32_t>(k);
       } else {
         planes_.push_back(static_cast<std::uint32_t>(k));
       }
@@ -59,13 +71,10 @@ class EventDriven final : public Method {
     for (int axis = 0; axis < 3; ++axis) {
       if (!surroundings.periodic || (axis == 2 && surroundings.planar())) continue;
       period_[axis] = Real(surroundings.box.max[axis]) - Real(surroundings.box.min[axis]);
-      smallest_period_ = std::min(smallest_period_, period_[axis]);
+      space_.period[axis] = period_[axis];
+      space_.per_period[axis] = 1 / period_[axis];
     }
-    for (int image = 0; image < 27; ++image) {
-      image_shift_[static_cast<std::size_t>(image)] = {Real(image % 3 - 1) * period_[0],
-                                                       Real(image / 3 % 3 - 1) * period_[1],
-                                                       Real(image / 9 - 1) * period_[2]};
-    }
+    space_.fall = surroundings.gravity.cast<Real>();
   }
 
   const char* name() const override { return "event_driven"; }
@@ -73,28 +82,25 @@ class EventDriven final : public Method {
   void insert(BallId id, const Ball& ball) override {
     assert(slots_.empty() || agendas_[slots_.back()].id < id);
     const Slot slot = takeSlot();
-    Body& body = bodies_[slot];
-    body = {ball.position.cast<Real>(), ball.velocity.cast<Real>(), now_, Real(ball.radius)};
+    bodies_[slot] = {ball.position.cast<Real>(), ball.velocity.cast<Real>(), now_,
+                     Real(ball.radius)};
     agendas_[slot].mass = ball.mass;
     agendas_[slot].id = id;
     slots_.push_back(slot);
     if (restitution_ < 1) histories_[slot] = {};
-    if constexpr (kGravity) {
-      accelerations_[slot] = isFixed(slot) ? Vec(Vec::Zero()) : gravity_;
-      resting_[slot] = {};
-    }
+    if constexpr (kGravity) contacts_.release(slot, isFixed(slot));
     ++agendas_[slot].version;
-    if (slots_.size() > 2 * balls_at_layout_ + 16 || !fits(body)) ready_ = false;
-    if (ready_) {
-      place(slot);
-      search(slot);
-    }
+    if (slots_.size() > 2 * balls_at_layout_ + 16 || !fits(slot)) ready_ = false;
+    if (ready_) settleIn(slot);
   }
 
   void remove(BallId id) override {
     const auto found = find(id);
     const Slot slot = *found;
-    if (ready_) lift(slot);
+    if (ready_) {
+      lift(slot);
+      if (listed_) lists_.replace(slot, {});
+    }
     ++agendas_[slot].version;
     slots_.erase(found);
     free_slots_.push_back(slot);
@@ -103,19 +109,13 @@ class EventDriven final : public Method {
   void setMotion(BallId id, const Vector3& position, const Vector3& velocity) override {
     const Slot slot = *find(id);
     if (ready_) lift(slot);
-    Body& body = bodies_[slot];
+    Body<Real>& body = bodies_[slot];
     body.x = position.cast<Real>();
     body.v = velocity.cast<Real>();
     body.time = now_;
     ++agendas_[slot].version;
-    if constexpr (kGravity) {
-      resting_[slot] = {};
-      accelerations_[slot] = gravity_;
-    }
-    if (ready_) {
-      place(slot);
-      search(slot);
-    }
+    if constexpr (kGravity) contacts_.release(slot, false);
+    if (ready_) settleIn(slot);
   }
 
   void setVelocity(BallId id, const Vector3& velocity) override {
@@ -130,11 +130,10 @@ class EventDriven final : public Method {
   }
 
   bool advanceTo(Time target, std::uint64_t max_events) override {
-    if (!ready_) layOut();
     while (true) {
+      if (!ready_) layOut();
       const Real limit = Real(target - origin_);
-      const Slot slot = queue_.peek(limit, tieOrder(), expectation());
-      if (slot == kNoSlot) {
+      if (!queue_.isDue(limit, firstId(), expectation())) {
         if (limit < queue_.yearLength()) {
           now_ = limit;
           reached_ = target;
@@ -148,9 +147,10 @@ class EventDriven final : public Method {
         return false;
       }
       --max_events;
-      now_ = std::max(now_, queue_.pop());
+      const auto due = queue_.pop(firstId(), secondId());
+      now_ = std::max(now_, due.time);
       ++statistics_.events;
-      handle(slot);
+      handle(due.slot);
     }
   }
   using Method::advanceTo;
@@ -195,37 +195,13 @@ class EventDriven final : public Method {
     statistics.queue_depth = slots_.size();
     statistics.bytes = grid_.bytes() + queue_.bytes() + capacityBytes(bodies_) +
                        capacityBytes(agendas_) + capacityBytes(slots_) + capacityBytes(histories_) +
-                       capacityBytes(accelerations_) + capacityBytes(resting_);
+                       lists_.bytes() + contacts_.bytes();
     return statistics;
   }
 
   void setCollisionLog(CollisionLog* log) override { log_ = log; }
 
  private:
-  // What others look at, in one cache line: the place at the ball's own time.
-  struct alignas(64) Body {
-    Vec x;      // m, at `time`
-    Vec v;      // m/s, at `time`
-    Real time;  // s, in this year
-    Real radius;
-  };
-
-  // What only the ball itself needs: its next event, its cell, its name and mass.
-  struct alignas(64) Agenda {
-    Real impact_time = kNever<Real>;    // s, in this year
-    Real crossing_time = kNever<Real>;  // s, in this year
-    std::uint32_t partner = 0;          // slot, or kWall + index into walls_
-    std::uint32_t partner_version = 0;  // the partner's version when the impact was found
-    BallId partner_id = 0;
-    std::uint32_t version = 0;  // counts the changes of this ball's trajectory
-    BallId id = 0;
-    double mass = 0;  // kg
-    CellCoordinates cell = {0, 0, 0};
-    std::uint8_t crossing_axis = 0;
-    std::int8_t crossing_direction = 0;  // -1 or +1
-    std::uint8_t level = 0;              // index into the grid's levels
-  };
-
   static constexpr std::uint32_t kWall = 0xF8000000;
 
   // The ball that another has parted from at this instant.
@@ -263,28 +239,30 @@ class EventDriven final : public Method {
     const std::size_t count = bodies_.size() + 1;
     bodies_.resize(count);
     agendas_.resize(count);
-    queue_.resize(count);
     if (restitution_ < 1) histories_.resize(count);
-    if constexpr (kGravity) {
-      accelerations_.resize(count);
-      resting_.resize(count);
-    }
+    if constexpr (kGravity) contacts_.resize(count);
     grid_.resize(count);
+    if (listed_) lists_.resize(count);
     return static_cast<Slot>(count - 1);
   }
 
   bool isFixed(Slot slot) const { return std::isinf(agendas_[slot].mass); }
   Real inverseMass(Slot slot) const { return 1 / Real(agendas_[slot].mass); }  // 1/kg; 0: fixed
 
-  // Order of events at one instant: smaller id, then larger id; a crossing has no second partner.
-  auto tieOrder() const {
+  // Order of events at one instant: smaller id first, then walls, then larger id.
+  auto firstId() const {
     return [this](Slot slot) {
-      const Agenda& agenda = agendas_[slot];
-      const Partner self = agenda.id;
-      if (agenda.crossing_time < agenda.impact_time) return TieOrder(self, self);
-      const Partner other = agenda.partner >= kWall ? walls_[agenda.partner - kWall].partner
-                                                    : Partner{agenda.partner_id};
-      return TieOrder(std::min(self, other), std::max(self, other));
+      const Agenda<Real>& agenda = agendas_[slot];
+      if (agenda.crossing_time < agenda.impact_time || agenda.partner >= kWall) return agenda.id;
+      return std::min(agenda.id, agendas_[agenda.partner].id);
+    };
+  }
+  auto secondId() const {
+    return [this](Slot slot) -> Partner {
+      const Agenda<Real>& agenda = agendas_[slot];
+      if (agenda.crossing_time < agenda.impact_time) return agenda.id;
+      if (agenda.partner >= kWall) return walls_[agenda.partner - kWall].partner;
+      return std::max(agenda.id, agendas_[agenda.partner].id);
     };
   }
 
@@ -292,45 +270,45 @@ class EventDriven final : public Method {
   // before has fetched.
   auto expectation() {
     return [this](Slot slot, std::uint32_t buckets_ahead) {
+      const Agenda<Real>& agenda = agendas_[slot];
+      const bool meets = agenda.impact_time <= agenda.crossing_time && agenda.partner < kWall;
       if (buckets_ahead == EventQueue<Real>::kSoon) {
-        __builtin_prefetch(&agendas_[slot]);
         __builtin_prefetch(&bodies_[slot]);
-        return;
-      }
-      const Agenda& agenda = agendas_[slot];
-      if (buckets_ahead == EventQueue<Real>::kSooner) {
-        grid_.prefetchNear(agenda.cell, agenda.level);
-        if (agenda.impact_time <= agenda.crossing_time && agenda.partner < kWall) {
+        if (meets) {
           __builtin_prefetch(&bodies_[agenda.partner]);
           __builtin_prefetch(&agendas_[agenda.partner]);
         }
+        if (listed_) lists_.prefetch(slot);
+      } else if (buckets_ahead == EventQueue<Real>::kSooner) {
+        if (!listed_) grid_.prefetchNear(agenda.cell, agenda.level);
+        if (listed_ && meets) lists_.prefetch(agenda.partner);
+      } else if (listed_) {
+        prefetchBodies(lists_.of(slot), lists_.count(slot));
       } else {
         grid_.gatherNear(agenda.cell, agenda.level, candidates_);
-        for (std::size_t i = 0; i < candidates_.count; ++i) {
-          __builtin_prefetch(&bodies_[candidates_.slots[i]]);
-        }
+        prefetchBodies(candidates_.slots.data(), candidates_.count);
       }
     };
   }
 
-  Real due(Slot slot) const {
-    return std::min(agendas_[slot].impact_time, agendas_[slot].crossing_time);
+  void prefetchBodies(const Slot* slots, std::size_t count) const {
+    for (std::size_t i = 0; i < count; ++i) __builtin_prefetch(&bodies_[slots[i]]);
   }
 
-  void enqueue(Slot slot) { queue_.insert(slot, due(slot), tieOrder()); }
+  void enqueue(Slot slot) { queue_.insert(slot, firstId()); }
 
   // --- motion between events
 
   Vec positionAt(Slot slot, Real time) const {
-    const Body& body = bodies_[slot];
+    const Body<Real>& body = bodies_[slot];
     const Real dt = time - body.time;
-    if constexpr (kGravity) return body.x + dt * (body.v + (dt / 2) * accelerations_[slot]);
+    if constexpr (kGravity) return body.x + dt * (body.v + (dt / 2) * contacts_.acceleration(slot));
     return body.x + dt * body.v;
   }
 
   Vec velocityAt(Slot slot, Real time) const {
-    const Body& body = bodies_[slot];
-    if constexpr (kGravity) return body.v + (time - body.time) * accelerations_[slot];
+    const Body<Real>& body = bodies_[slot];
+    if constexpr (kGravity) return body.v + (time - body.time) * contacts_.acceleration(slot);
     return body.v;
   }
 
@@ -339,29 +317,27 @@ class EventDriven final : public Method {
 
   // Stores the place of now, for a change of velocity to start from.
   void settle(Slot slot) {
-    Body& body = bodies_[slot];
+    Body<Real>& body = bodies_[slot];
     body.x = positionNow(slot);
     body.v = velocityNow(slot);
     body.time = now_;
   }
 
   Vec nearestImage(Vec dx) const {
-    using std::floor;
     for (int axis = 0; axis < 3; ++axis) {
-      if (period_[axis] > 0)
-        dx[axis] -= floor(dx[axis] / period_[axis] + Real(0.5)) * period_[axis];
+      dx[axis] -= nearestWhole(dx[axis] * space_.per_period[axis]) * period_[axis];
     }
     return dx;
   }
 
   // From a to the image of b that it meets: the nearest, but where the box is so small that several
   // are in reach, the one it approaches fastest.
-  Vec contactVector(const Body& a, const Body& b, Real reach) const {
-    Vec nearest = nearestImage(b.x - a.x);
-    if (smallest_period_ > Real(2.1) * reach) return nearest;
+  Vec contactVector(const Body<Real>& a, const Body<Real>& b, Real reach) const {
+    const Vec nearest = nearestImage(b.x - a.x);
+    if (images_.empty()) return nearest;
     Vec best = nearest;
     Real fastest = -kNever<Real>;
-    for (const Vec& shift : image_shift_) {
+    for (const Vec& shift : images_) {
       const Vec dx = nearest + shift;
       const Real approach = -dot(dx, Vec(b.v - a.v));
       if (dot(dx, dx) < reach * reach * Real(1 + 1e-9) && approach > fastest) {
@@ -382,10 +358,11 @@ class EventDriven final : public Method {
     return x;
   }
 
-  // --- layout: cells and calendar
+  // --- layout: cells or lists, and the calendar
 
-  bool fits(const Body& body) const {
-    return ready_ && 2 * body.radius * Real(kCellMargin) <= coarsest_edge_;
+  bool fits(Slot slot) const {
+    const Real width = 2 * bodies_[slot].radius * Real(kCellMargin);
+    return ready_ && width <= (listed_ ? list_reach_ : coarsest_edge_);
   }
 
   std::uint8_t levelOf(Real radius) const {
@@ -398,7 +375,8 @@ class EventDriven final : public Method {
     return static_cast<std::uint8_t>(level);
   }
 
-  // Builds grid and calendar for the balls as they are now, and finds every ball's next event.
+  // Builds cells, lists and calendar for the balls as they are now, and finds every ball's next
+  // event.
   void layOut() {
     std::vector<GridBall<Real>> balls;
     balls.reserve(slots_.size());
@@ -406,16 +384,51 @@ class EventDriven final : public Method {
       bringHome(slot);
       balls.push_back({positionNow(slot), bodies_[slot].radius});
     }
-    grid_ = layOutGrid<Real>(surroundings_, balls);
+    cutSpace(balls);
     coarsest_edge_ = coarsestEdge(grid_);
     renumber(balls);
     grid_.resize(bodies_.size());
+    if (listed_) lists_.reset(bodies_.size(), list_capacity_);
     for (const Slot slot : slots_) place(slot);
+    if (listed_) listAll();
     balls_at_layout_ = slots_.size();
-    collisions_at_layout_ = statistics_.ball_collisions;
+    crossings_at_layout_ = crossings_;
     ready_ = true;
     for (const Slot slot : slots_) findNextEvent(slot);
     setCalendar(estimatedEventRate());
+  }
+
+  // Decides between cells and lists, and whether the nearest image of a ball in a periodic box is
+  // the only one in reach.
+  void cutSpace(const std::vector<GridBall<Real>>& balls) {
+    listed_ = wantsLists(surroundings_, balls);
+    if (listed_) {
+      Real largest = 0;
+      for (const GridBall<Real>& ball : balls) largest = std::max(largest, ball.radius);
+      const Real half = Real(NeighbourLists::kHalfRegion) * largest;
+      list_reach_ = 2 * largest * Real(kCellMargin);
+      grid_ = layOutGrid<Real>(surroundings_, balls, 2 * half);
+      regions_ = grid_.lattice(NeighbourLists::kLatticeDepth);
+      for (std::size_t k = 0; k < 3; ++k) {
+        region_width_[k] = static_cast<std::int32_t>(2 * half / regions_.spacing[k]);
+        regions_.half[k] = Real(region_width_[k]) * regions_.spacing[k] / 2;
+      }
+      listed_ = nearestImagesSuffice(grid_);
+    }
+    if (!listed_) {
+      grid_ = layOutGrid<Real>(surroundings_, balls, 0);
+      lists_ = {};
+    }
+    const bool nearest = nearestImagesSuffice(grid_);
+    images_.clear();
+    for (int image = 0; image < 27 && !nearest; ++image) {
+      const Vec turns(Real(image % 3 - 1), Real(image / 3 % 3 - 1), Real(image / 9 - 1));
+      const Vec shift = turns.cwiseProduct(period_);
+      if (std::find(images_.begin(), images_.end(), shift) == images_.end()) {
+        images_.push_back(shift);
+      }
+    }
+    search_pairs_ = choosePairSearch<Real>(surroundings_.periodic && nearest, kGravity);
   }
 
   // Gives the balls new slots along a space-filling curve, so that neighbours in space are
@@ -427,11 +440,10 @@ class EventDriven final : public Method {
     };
     std::vector<Place> places;
     places.reserve(slots_.size());
+    const int finest = grid_.levels().back().depth();
     for (std::size_t i = 0; i < slots_.size(); ++i) {
-      const auto level = levelOf(balls[i].radius);
-      const int coarser = grid_.levels().back().depth() - grid_.levels()[level].depth();
-      places.push_back({mortonKey(grid_.coordinatesOf(balls[i].x, level), coarser),
-                        static_cast<std::uint32_t>(i)});
+      places.push_back(
+          {mortonKey(grid_.coordinatesOf(balls[i].x, finest)), static_cast<std::uint32_t>(i)});
     }
     std::sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
       return a.key != b.key ? a.key < b.key : a.rank < b.rank;
@@ -446,18 +458,22 @@ class EventDriven final : public Method {
     reorder(bodies_);
     reorder(agendas_);
     reorder(histories_);
-    reorder(accelerations_);
-    reorder(resting_);
+    reorder(contacts_.numbers());
     free_slots_.clear();
     for (std::size_t i = 0; i < places.size(); ++i) slots_[places[i].rank] = static_cast<Slot>(i);
   }
 
-  // Events per second, from the times at which half of the balls have their next one.
+  // Events per second, from the times at which half of the balls have their next one. What happens
+  // at once, as on a lattice laid just along the cells, tells nothing of what comes after.
   Real estimatedEventRate() const {
+    Real longest = 0;
+    const auto wait = [this](Slot slot) { return agendas_[slot].due() - now_; };
+    for (const Slot slot : slots_) {
+      if (wait(slot) < kNever<Real>) longest = std::max(longest, wait(slot));
+    }
     std::vector<Real> waits;
     for (const Slot slot : slots_) {
-      const Real wait = due(slot) - now_;
-      if (wait > 0 && wait < kNever<Real>) waits.push_back(wait);
+      if (wait(slot) > Real(1e-9) * longest && wait(slot) <= longest) waits.push_back(wait(slot));
     }
     if (waits.empty()) return 0;
     const auto middle = waits.begin() + static_cast<std::ptrdiff_t>(waits.size() / 2);
@@ -465,30 +481,33 @@ class EventDriven final : public Method {
     return Real(0.7) * Real(waits.size()) / *middle;
   }
 
-  // A year of about two events a ball, a bucket of about one event.
+  // A year of about three events a ball at least.
   void setCalendar(Real events_per_second) {
-    std::uint32_t buckets = 64;
-    while (buckets < 2 * slots_.size()) buckets *= 2;
+    std::uint32_t buckets = 8;
+    while (Real(buckets) * kEventsPerBucket < 3 * Real(slots_.size())) buckets *= 2;
     const Real width = events_per_second > 0 ? kEventsPerBucket / events_per_second : Real(1);
     // Clocks restart with the calendar.
     shiftClocks(now_);
-    queue_.reset(floorToPowerOfTwo(width), buckets, bodies_.size());
+    queue_.reset(floorToThreeBits(width), buckets);
     for (const Slot slot : slots_) enqueue(slot);
     events_at_new_year_ = statistics_.events;
   }
 
-  static Real floorToPowerOfTwo(Real x) {
+  // Years of so few digits are taken from times without rounding.
+  static Real floorToThreeBits(Real x) {
     int exponent = 0;
+    using std::floor;
     using std::frexp;
     using std::ldexp;
-    (void)frexp(x, &exponent);
-    return ldexp(Real(1), exponent - 1);
+    const Real fraction = frexp(x, &exponent);
+    return ldexp(floor(8 * fraction), exponent - 3);
   }
 
   void shiftClocks(Real by) {
     if (by == 0) return;
     origin_ = origin_ + double(by);
     now_ -= by;
+    watch_.setBack(by);
     for (const Slot slot : slots_) {
       bodies_[slot].time -= by;
       agendas_[slot].impact_time -= by;
@@ -506,11 +525,12 @@ class EventDriven final : public Method {
     shiftClocks(now_);
     // A place stored many years ago would lose digits of its time.
     for (const Slot slot : slots_) {
-      if (bodies_[slot].time < -16 * year) settle(slot);
+      if (bodies_[slot].time < -32 * year) settle(slot);
     }
-    queue_.turnYear(years * year, tieOrder());
-    // Balls that have mixed lie at random in memory again.
-    if (statistics_.ball_collisions - collisions_at_layout_ > kImpactsPerLayout * slots_.size()) {
+    queue_.turnYear(firstId());
+    // Balls that have mixed lie at random in memory again, which matters beyond the caches.
+    if (slots_.size() > kCachedBalls &&
+        crossings_ - crossings_at_layout_ > kCrossingsPerLayout * slots_.size()) {
       layOut();
     } else {
       retuneCalendar(years);
@@ -521,7 +541,7 @@ class EventDriven final : public Method {
     const auto events = Real(statistics_.events - events_at_new_year_);
     events_at_new_year_ = statistics_.events;
     const Real per_bucket = events / (years * queue_.yearLength() / queue_.bucketWidth());
-    const bool off = per_bucket > 4 * kEventsPerBucket || 4 * per_bucket < kEventsPerBucket;
+    const bool off = per_bucket > 2 * kEventsPerBucket || 2 * per_bucket < kEventsPerBucket;
     if (off && events > 0) setCalendar(per_bucket / queue_.bucketWidth());
   }
 
@@ -536,12 +556,28 @@ class EventDriven final : public Method {
     }
   }
 
+  // Puts a ball into the cell in which it is now.
   void place(Slot slot) {
-    Agenda& agenda = agendas_[slot];
+    Agenda<Real>& agenda = agendas_[slot];
     bringHome(slot);
     agenda.level = levelOf(bodies_[slot].radius);
-    agenda.cell = grid_.coordinatesOf(positionNow(slot), agenda.level);
+    const int depth = grid_.levels()[agenda.level].depth();
+    if (listed_) {
+      const int fine = depth + NeighbourLists::kLatticeDepth;
+      const CellCoordinates home = grid_.coordinatesOf(positionNow(slot), fine);
+      lists_.setHome(slot, home);
+      agenda.cell = CellGrid<Real>::coarser(home, fine, depth);
+    } else {
+      agenda.cell = grid_.coordinatesOf(positionNow(slot), depth);
+    }
     grid_.link(slot, agenda.cell, agenda.level);
+  }
+
+  // Puts a ball that came while others fly among them.
+  void settleIn(Slot slot) {
+    place(slot);
+    if (listed_) relist(slot);
+    search(slot);
   }
 
   void lift(Slot slot) {
@@ -549,12 +585,56 @@ class EventDriven final : public Method {
     grid_.unlink(slot, agendas_[slot].cell, agendas_[slot].level);
   }
 
+  // --- neighbour lists
+
+  // Those whose regions come within reach of this ball's.
+  const std::vector<Slot>& neighboursOf(Slot slot) {
+    grid_.gatherNear(agendas_[slot].cell, agendas_[slot].level, candidates_);
+    const CellCoordinates& home = lists_.home(slot);
+    neighbours_.resize(candidates_.count);
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < candidates_.count; ++i) {
+      const Slot other = candidates_.slots[i];
+      const CellCoordinates& there = lists_.home(other);
+      Real squared = 0;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::int32_t apart =
+            grid_.cellsBetween(k, home[k], there[k], NeighbourLists::kLatticeDepth);
+        const Real gap = Real(std::max(apart - region_width_[k], 0)) * regions_.spacing[k];
+        squared += gap * gap;
+      }
+      // Without a branch, which would often be foretold wrongly.
+      neighbours_[count] = other;
+      const bool is_near = squared < list_reach_ * list_reach_;
+      count += static_cast<std::size_t>(is_near & (other != slot));
+    }
+    neighbours_.resize(count);
+    return neighbours_;
+  }
+
+  void listAll() {
+    for (const Slot slot : slots_) {
+      if (lists_.set(slot, neighboursOf(slot))) continue;
+      list_capacity_ = neighbours_.size() + 1;
+      lists_.widen(list_capacity_);
+      lists_.set(slot, neighbours_);
+    }
+  }
+
+  // A new list for a ball with a new home; where there is no room, all is laid out anew.
+  void relist(Slot slot) {
+    if (lists_.replace(slot, neighboursOf(slot))) return;
+    list_capacity_ += 2;
+    ready_ = false;
+  }
+
   // --- events
 
   void handle(Slot slot) {
-    const Agenda& agenda = agendas_[slot];
+    const Agenda<Real>& agenda = agendas_[slot];
     if (agenda.crossing_time < agenda.impact_time) {
-      cross(slot);
+      ++crossings_;
+      listed_ ? moveHouse(slot) : cross(slot);
     } else if (agenda.partner >= kWall) {
       meetWall(slot, agenda.partner - kWall);
     } else if (agendas_[agenda.partner].version == agenda.partner_version) {
@@ -564,14 +644,37 @@ class EventDriven final : public Method {
     }
   }
 
+  // Out of its region: a new home, and a new list.
+  void moveHouse(Slot slot) {
+    lift(slot);
+    settleIn(slot);
+  }
+
+  // Into the next cell: only the balls that came near by this are new.
   void cross(Slot slot) {
-    Agenda& agenda = agendas_[slot];
-    const int axis = agenda.crossing_axis;
-    const auto k = static_cast<std::size_t>(axis);
+    Agenda<Real>& agenda = agendas_[slot];
     const CellCoordinates before = agenda.cell;
-    agenda.cell[k] += agenda.crossing_direction;
+    agenda.cell[agenda.crossing_axis] += agenda.crossing_direction;
     const CellCoordinates unwrapped = agenda.cell;
-    if (period_[axis] > 0) {
+    wrapCrossing(slot);
+    grid_.move(slot, before, agenda.cell, agenda.level);
+    if (!images_.empty()) return search(slot);  // other images are in reach now, too
+    Found found{agenda.impact_time, agenda.partner};
+    grid_.gatherNewLayer(before, unwrapped, agenda.cell, agenda.level, agenda.crossing_axis,
+                         candidates_);
+    considerBalls(seekerAt(slot, {}), {candidates_.slots.data(), candidates_.count}, found);
+    considerWallsOf(slot, found);
+    if (found.time < agenda.impact_time) setImpact(slot, found);
+    findCrossing(slot);
+    enqueue(slot);
+  }
+
+  // A ball that left the periodic box comes in again on the other side.
+  void wrapCrossing(Slot slot) {
+    Agenda<Real>& agenda = agendas_[slot];
+    const std::size_t k = agenda.crossing_axis;
+    const int axis = agenda.crossing_axis;
+    if (grid_.axis(k).periodic) {
       const std::int32_t count = grid_.count(k, agenda.level);
       if (agenda.cell[k] < 0) {
         agenda.cell[k] = count - 1;
@@ -581,48 +684,38 @@ class EventDriven final : public Method {
         bodies_[slot].x[axis] -= period_[axis];
       }
     } else if (agenda.cell[k] > kFarthestCell || agenda.cell[k] < -kFarthestCell) {
-      throw std::range_error("ball " + std::to_string(agendas_[slot].id) +
-                             " has flown 2^30 cells away");
+      throw std::range_error("ball " + std::to_string(agenda.id) + " has flown 2^30 cells away");
     }
-    grid_.move(slot, before, agenda.cell, agenda.level);
-    Found found{agenda.impact_time, agenda.partner};
-    const Real old_time = found.time;
-    grid_.gatherNewLayer(before, unwrapped, agenda.cell, agenda.level, k,
-                         agenda.crossing_direction > 0 ? 2 : 0, candidates_);
-    considerCandidates(seekerAt(slot, {}), found);
-    considerWallsOf(slot, found);
-    if (found.time < old_time) setImpact(slot, found);
-    findCrossing(slot);
-    enqueue(slot);
+  }
+
+  Impacting<Real> impacting(Slot slot) {
+    return {bodies_[slot].v, inverseMass(slot), restitution_ < 1 ? histories_[slot] : no_history_};
   }
 
   void meetBall(Slot first, Slot second) {
+    if (policy_ == SimultaneousImpacts::simultaneous && meetTogether(first, second)) return;
     if (agendas_[second].id < agendas_[first].id) std::swap(first, second);
     settle(first);
     settle(second);
-    Body& a = bodies_[first];
-    Body& b = bodies_[second];
+    Body<Real>& a = bodies_[first];
+    Body<Real>& b = bodies_[second];
     const Real reach = a.radius + b.radius;
     const Vec dx = contactVector(a, b, reach);
-    const Vec n = contactNormal<Real>(dx);
-    Real e = restitution_;
-    Real least = 0;
+    Vec pressing = Vec::Zero();
     if constexpr (kGravity) {
-      const Vec pressing = accelerations_[first] - accelerations_[second];
-      least = leastRebound<Real>(dot(pressing, n), reach);
+      pressing = contacts_.acceleration(first) - contacts_.acceleration(second);
     }
-    if (e < 1) {
-      const Real speed = dot(a.v, n) - dot(b.v, n);
-      const bool a_collapses = histories_[first].record(now_, speed, reach);
-      const bool b_collapses = histories_[second].record(now_, speed, reach);
-      if (a_collapses || b_collapses) e = 1;
-    }
-    const Exchange<Real> passed =
-        collide<Real>(a.v, inverseMass(first), b.v, inverseMass(second), n, e, least);
+    const auto impact = core::meetBall<Real>(dx, reach, pressing, restitution_, now_,
+                                             impacting(first), impacting(second));
+    const Vec& n = impact.normal;
+    const Exchange<Real>& passed = impact.exchange;
     if (passed.impulse > 0) {
       ++statistics_.ball_collisions;
       statistics_.virial += double(passed.impulse * reach);
-      noteOverlap(reach - dot(dx, n));
+      noteOverlap(impact.overlap);
+      watch({agendas_[first].id, a.v, inverseMass(first), passed.change1},
+            {agendas_[second].id, b.v, inverseMass(second), passed.change2}, n,
+            passed.approach_speed, reach);
       report(first, agendas_[second].id, n, passed.impulse, passed.approach_speed);
     }
     velocityChanged(first);
@@ -634,27 +727,211 @@ class EventDriven final : public Method {
   }
 
   void meetWall(Slot slot, std::uint32_t index) {
+    if (policy_ == SimultaneousImpacts::simultaneous && meetTogether(slot, kNoSlot)) return;
     settle(slot);
-    Body& body = bodies_[slot];
+    Body<Real>& body = bodies_[slot];
     const Wall<Real>& wall = walls_[index];
     Real pull = 0;
-    if constexpr (kGravity) pull = dot(accelerations_[slot], wall.normal);
-    const Real speed = -dot(body.v, wall.normal);
-    Real e = restitution_;
-    if (e < 1 && !(pull < 0) && histories_[slot].record(now_, speed, body.radius)) e = 1;
-    noteOverlap(wall.offset + body.radius - dot(body.x, wall.normal));
-    collideWithWall<Real>(body.v, wall.normal, e);
+    if constexpr (kGravity) pull = dot(contacts_.acceleration(slot), wall.normal);
+    const auto impact =
+        core::meetWall<Real>(wall, body.x, body.radius, pull, restitution_, now_, impacting(slot));
+    noteOverlap(impact.overlap);
     if constexpr (kGravity) {
-      if (comesToRest<Real>(dot(body.v, wall.normal), pull, body.radius)) {
-        resting_[slot].add(static_cast<int>(index));
-      }
+      if (impact.rests) contacts_.rest(slot, static_cast<int>(index));
     }
-    if (speed > 0) {
+    if (impact.speed > 0) {
       ++statistics_.wall_collisions;
-      report(slot, wall.partner, -wall.normal, (1 + e) * speed * Real(agendas_[slot].mass), speed);
+      const Vec at_rest = Vec::Zero();
+      const Real change = (1 + impact.restitution) * impact.speed;
+      watch({agendas_[slot].id, body.v, inverseMass(slot), change},
+            {OrderWatch<Real>::wallKey(index), at_rest, 0, 0}, -wall.normal, impact.speed,
+            body.radius);
+      report(slot, wall.partner, -wall.normal, change * Real(agendas_[slot].mass), impact.speed);
     }
     velocityChanged(slot);
     search(slot);
+  }
+
+  void watch(const typename OrderWatch<Real>::Side& a, const typename OrderWatch<Real>::Side& b,
+             const Vec& normal, Real speed, Real reach) {
+    if (watch_.note(now_, a, b, normal, speed, reach, restitution_)) {
+      ++statistics_.ambiguous_impacts;
+    }
+  }
+
+  // --- policy `simultaneous`
+
+  // Balls that touch each other, or through others, at this instant.
+  struct Cluster {
+    std::vector<Slot> members;  // by ascending id
+    std::vector<ClusterBody<Real>> bodies;
+    std::vector<ClusterContact<Real>> contacts;  // by bodies
+  };
+
+  // One round of joint reflections of the cluster around an impact of `slot`, which is not queued.
+  // @param other  the ball it meets, or kNoSlot
+  // @return false: nothing else approaches there, and the impact is one like others
+  bool meetTogether(Slot slot, Slot other) {
+    Cluster cluster = clusterAround(slot, other);
+    keepApproaching(cluster.bodies, cluster.contacts);
+    if (cluster.contacts.size() < 2) return false;
+    if (orderMatters<Real>(cluster.bodies, cluster.contacts, restitution_)) {
+      ++statistics_.ambiguous_impacts;
+    }
+    const Real e = recordImpacts(cluster) ? Real(1) : restitution_;
+    reflectTogether(cluster.bodies, cluster.contacts, e);
+    std::vector<bool> changed(cluster.members.size(), false);
+    for (const ClusterContact<Real>& contact : cluster.contacts) {
+      changed[contact.a] = true;
+      if (!contact.withWall()) changed[contact.b] = true;
+    }
+    const auto forChanged = [&](auto f) {
+      for (std::size_t i = 0; i < changed.size(); ++i) {
+        if (changed[i]) f(cluster.members[i], cluster.bodies[i].v);
+      }
+    };
+    forChanged([&](Slot member, const Vec& v) {
+      settle(member);
+      bodies_[member].v = v;
+      if (member != slot) queue_.remove(member);
+    });
+    for (const ClusterContact<Real>& contact : cluster.contacts) conclude(cluster, contact);
+    forChanged([&](Slot member, const Vec&) { velocityChanged(member); });
+    forChanged([&](Slot member, const Vec&) { search(member); });
+    if (!changed[indexIn(cluster, slot)]) search(slot);
+    return true;
+  }
+
+  static std::size_t indexIn(const Cluster& cluster, Slot slot) {
+    const auto& members = cluster.members;
+    return static_cast<std::size_t>(std::find(members.begin(), members.end(), slot) -
+                                    members.begin());
+  }
+
+  Cluster clusterAround(Slot slot, Slot other) {
+    Cluster cluster;
+    std::vector<Slot>& members = cluster.members;
+    members.push_back(slot);
+    if (other != kNoSlot) members.push_back(other);
+    for (std::size_t k = 0; k < members.size(); ++k) {
+      if (isFixed(members[k])) continue;  // hands nothing on
+      forEachTouching(members[k], [&](Slot touched, const Vec&, Real) {
+        if (indexIn(cluster, touched) == members.size()) members.push_back(touched);
+      });
+    }
+    std::sort(members.begin(), members.end(),
+              [&](Slot a, Slot b) { return agendas_[a].id < agendas_[b].id; });
+    for (const Slot member : members) {
+      cluster.bodies.push_back({velocityNow(member), inverseMass(member)});
+    }
+    for (std::size_t i = 0; i < members.size(); ++i) addContacts(cluster, i);
+    return cluster;
+  }
+
+  // Calls f with each ball that `slot` touches now, the way to it, and the gap.
+  template <class Function>
+  void forEachTouching(Slot slot, Function f) {
+    using std::sqrt;
+    const Near near = nearTo(slot);
+    for (std::size_t i = 0; i < near.count; ++i) {
+      const Slot other = near.slots[i];
+      if (other == slot) continue;
+      const Vec nearest = nearestImage(positionNow(other) - positionNow(slot));
+      const Real reach = bodies_[slot].radius + bodies_[other].radius;
+      const Real extent = std::max(extentOf(slot), extentOf(other));
+      forEachImage([&](const Vec& image) {
+        const Vec dx = nearest + image;
+        const Real gap = sqrt(dot(dx, dx)) - reach;
+        if (touches(gap, reach, extent)) f(other, dx, gap);
+      });
+    }
+  }
+
+  // What a ball's place was last computed from: where it is, and how far it may have come.
+  Real extentOf(Slot slot) const {
+    const Vec v = velocityNow(slot);
+    return positionNow(slot).cwiseAbs().maxCoeff() + std::sqrt(dot(v, v)) * now_;
+  }
+
+  Vec accelerationOf(Slot slot) const {
+    if constexpr (kGravity) return contacts_.acceleration(slot);
+    return Vec::Zero();
+  }
+
+  // Those of member i with walls, and with members after it.
+  void addContacts(Cluster& cluster, std::size_t i) {
+    const Slot slot = cluster.members[i];
+    const Real radius = bodies_[slot].radius;
+    for (std::size_t k = 0; k < walls_.size() && !isFixed(slot); ++k) {
+      const Real gap = dot(positionNow(slot), walls_[k].normal) - walls_[k].offset - radius;
+      if (!touches(gap, radius, extentOf(slot))) continue;
+      ClusterContact<Real> contact;
+      contact.a = i;
+      contact.wall = k;
+      contact.normal = -walls_[k].normal;
+      contact.gap = gap;
+      contact.reach = radius;
+      cluster.contacts.push_back(contact);
+    }
+    forEachTouching(slot, [&](Slot other, const Vec& dx, Real gap) {
+      const std::size_t j = indexIn(cluster, other);
+      if (j <= i || j == cluster.members.size() || (isFixed(slot) && isFixed(other))) return;
+      ClusterContact<Real> contact;
+      contact.a = i;
+      contact.b = j;
+      contact.normal = contactNormal<Real>(dx);
+      contact.gap = gap;
+      contact.reach = radius + bodies_[other].radius;
+      const Vec pressing = accelerationOf(slot) - accelerationOf(other);
+      contact.least_rebound = leastRebound<Real>(dot(pressing, contact.normal), contact.reach);
+      cluster.contacts.push_back(contact);
+    });
+  }
+
+  // Tells the guard against collapse, once a ball, by its fastest contact. @return whether any ball
+  // is in a collapse
+  bool recordImpacts(const Cluster& cluster) {
+    if (!(restitution_ < 1)) return false;
+    bool collapses = false;
+    for (std::size_t i = 0; i < cluster.members.size(); ++i) {
+      const Slot slot = cluster.members[i];
+      Real speed = 0;
+      Real reach = 0;
+      for (const ClusterContact<Real>& contact : cluster.contacts) {
+        if (contact.a != i && contact.b != i) continue;
+        if (contact.withWall() && dot(accelerationOf(slot), contact.normal) > 0) continue;
+        if (contact.approach_speed > speed) {
+          speed = contact.approach_speed;
+          reach = contact.reach;
+        }
+      }
+      if (speed > 0 && histories_[slot].record(now_, speed, reach)) collapses = true;
+    }
+    return collapses;
+  }
+
+  // Counts and reports a contact after its impact.
+  void conclude(const Cluster& cluster, const ClusterContact<Real>& contact) {
+    if (!(contact.impulse > 0)) return;
+    const Slot slot = cluster.members[contact.a];
+    noteOverlap(-contact.gap);
+    if (!contact.withWall()) {
+      ++statistics_.ball_collisions;
+      statistics_.virial += double(contact.impulse * contact.reach);
+      report(slot, agendas_[cluster.members[contact.b]].id, contact.normal, contact.impulse,
+             contact.approach_speed);
+      return;
+    }
+    const Wall<Real>& wall = walls_[contact.wall];
+    if constexpr (kGravity) {
+      const Body<Real>& body = bodies_[slot];
+      const Real pull = dot(contacts_.acceleration(slot), wall.normal);
+      if (comesToRest<Real>(dot(body.v, wall.normal), pull, body.radius)) {
+        contacts_.rest(slot, static_cast<int>(contact.wall));
+      }
+    }
+    ++statistics_.wall_collisions;
+    report(slot, wall.partner, contact.normal, contact.impulse, contact.approach_speed);
   }
 
   // After any change of velocity: events found with the old one are stale; walls rested on are
@@ -662,10 +939,7 @@ class EventDriven final : public Method {
   void velocityChanged(Slot slot) {
     ++agendas_[slot].version;
     if constexpr (kGravity) {
-      if (resting_[slot].count == 0) return;
-      Body& body = bodies_[slot];
-      accelerations_[slot] =
-          settleContacts<Real>(resting_[slot], body.v, body.radius, gravity_, walls_);
+      contacts_.velocityChanged(slot, bodies_[slot].v, bodies_[slot].radius, walls_);
     }
   }
 
@@ -678,93 +952,109 @@ class EventDriven final : public Method {
   }
 
   void findNextEvent(Slot slot, const JustMet& met = {}) {
-    const Agenda& agenda = agendas_[slot];
     Found found;
-    grid_.gatherNear(agenda.cell, agenda.level, candidates_);
-    considerCandidates(seekerAt(slot, met), found);
+    considerBalls(seekerAt(slot, met), nearTo(slot), found);
     considerWallsOf(slot, found);
     setImpact(slot, found);
     findCrossing(slot);
   }
 
-  void setImpact(Slot slot, const Found& found) {
-    Agenda& agenda = agendas_[slot];
-    agenda.impact_time = found.time;
-    agenda.partner = found.partner;
-    if (found.partner < kWall && found.time < kNever<Real>) {
-      agenda.partner_version = agendas_[found.partner].version;
-      agenda.partner_id = agendas_[found.partner].id;
-    }
-  }
-
-  // One ball, as it is now, in search of its next impact.
-  struct Seeker {
-    Slot slot;
-    JustMet met;
-    Vec x;        // m
-    Vec v;        // m/s
-    Real radius;  // m
+  // Balls as PairSearch takes them.
+  struct Near {
+    const Slot* slots;
+    std::size_t count;
   };
 
-  Seeker seekerAt(Slot slot, const JustMet& met) const {
-    return {slot, met, positionNow(slot), velocityNow(slot), bodies_[slot].radius};
+  // All that a ball can meet before its crossing, perhaps itself among them.
+  Near nearTo(Slot slot) {
+    if (listed_) return {lists_.of(slot), lists_.count(slot)};
+    grid_.gatherNear(agendas_[slot].cell, agendas_[slot].level, candidates_);
+    return {candidates_.slots.data(), candidates_.count};
   }
 
-  // Takes the earliest impact with any of the candidates, if it is earlier than `found`. The ball
+  // Calls f with the shifts of the images that are in reach of a ball beside the nearest.
+  template <class Function>
+  void forEachImage(Function f) const {
+    if (images_.empty()) return f(Vec(Vec::Zero()));
+    for (const Vec& image : images_) f(image);
+  }
+
+  void setImpact(Slot slot, const Found& found) {
+    Agenda<Real>& agenda = agendas_[slot];
+    agenda.impact_time = found.time;
+    agenda.partner = found.partner;
+    if (found.partner < kWall) agenda.partner_version = agendas_[found.partner].version;
+  }
+
+  // One ball in search of its next impact, and whom it has just parted from.
+  struct Search {
+    Slot slot;
+    JustMet met;
+    Seeker<Real> seeker;
+  };
+
+  Search seekerAt(Slot slot, const JustMet& met) const {
+    return {slot, met, {positionNow(slot), velocityNow(slot), bodies_[slot].radius, now_}};
+  }
+
+  // Takes the earliest impact with any of the balls, if it is earlier than `found`. The ball
   // itself may be among them: it never approaches itself.
-  void considerCandidates(const Seeker& seeker, Found& found) {
-    for (std::size_t first = 0; first < candidates_.count; first += batch_.kCapacity) {
-      const std::size_t number = std::min(candidates_.count - first, batch_.kCapacity);
-      batch_slots_ = &candidates_.slots[first];
+  void considerBalls(const Search& search, const Near& near, Found& found) {
+    if (images_.empty()) return considerImages(search, near, found);
+    for (const Vec& image : images_) {
+      Search shifted = search;
+      shifted.seeker.x -= image;
+      considerImages(shifted, near, found);
+    }
+  }
+
+  void considerImages(const Search& search, const Near& near, Found& found) {
+    if (kGravity && !allFallFreely(search.slot, near)) return considerEach(search, near, found);
+    const PairHit<Real> hit =
+        search_pairs_(bodies_.data(), near.slots, near.count, search.seeker, space_);
+    if (!(now_ + hit.wait <= found.time)) return;
+    const Slot other = near.slots[hit.index];
+    if (hit.tied || other == search.met.partner) {  // seldom, and then not so simple
+      considerEach(search, near, found);
+    } else {
+      takeIfEarlier(other, now_ + hit.wait, found);
+    }
+  }
+
+  bool allFallFreely(Slot slot, const Near& near) const {
+    const auto falls = [this](Slot s) { return contacts_.fallsFreely(s); };
+    return falls(slot) && std::all_of(near.slots, near.slots + near.count, falls);
+  }
+
+  // The same, one by one: also where balls fall differently, or were just met, or tie.
+  void considerEach(const Search& search, const Near& near, Found& found) {
+    const Seeker<Real>& seeker = search.seeker;
+    for (std::size_t i = 0; i < near.count; ++i) {
+      const Slot other = near.slots[i];
+      Vec dx = positionNow(other) - seeker.x;
+      if (images_.empty()) dx = nearestImage(dx);
+      const Vec dv = velocityNow(other) - seeker.v;
+      Vec da = Vec::Zero();
       if constexpr (kGravity) {
-        loadFalling(seeker, first, number, found);
-      } else {
-        batch_.load(bodies_.front().x.data(), batch_slots_, number);
-        if (candidates_.wraps) {
-          for (std::size_t i = 0; i < number; ++i) {
-            batch_.shift(i, image_shift_[candidates_.images[first + i]]);
-          }
-        }
+        da = contacts_.acceleration(other) - contacts_.acceleration(search.slot);
       }
-      takeEarliest(seeker, found);
-    }
-  }
-
-  // Balls that fall go into the batch as they are now; those that fall differently from the seeker
-  // are settled at once.
-  void loadFalling(const Seeker& seeker, std::size_t first, std::size_t number, Found& found) {
-    batch_.count = 0;
-    for (std::size_t i = first; i < first + number; ++i) {
-      const Slot other = candidates_.slots[i];
-      Vec x = positionNow(other);
-      if (candidates_.wraps) x += image_shift_[candidates_.images[i]];
-      const Vec v = velocityNow(other);
-      const Vec da = accelerations_[other] - accelerations_[seeker.slot];
+      const Real reach = bodies_[other].radius + seeker.radius;
       if (dot(da, da) > 0) {
-        const Real reach = bodies_[other].radius + seeker.radius;
-        const Real wait = timeOfImpactAccelerated<Real>(x - seeker.x, v - seeker.v, da, reach);
-        takeIfEarlier(other, now_ + wait, found);
-      } else {
-        candidates_.slots[first + batch_.count] = other;
-        batch_.set(batch_.count++, x, v, now_, bodies_[other].radius);
+        takeIfEarlier(other, now_ + timeOfImpactAccelerated<Real>(dx, dv, da, reach), found);
+      } else if (!justParted(search, other)) {
+        takeIfEarlier(other, now_ + timeOfImpact<Real>(dx, dv, reach), found);
       }
     }
   }
 
-  // In straight relative motion two balls that have just met do not meet again. In a periodic box
-  // another image of the partner may be in reach too, but not in the same direction.
-  bool justParted(const Seeker& seeker, std::size_t i) const {
-    if (batch_slots_[i] != seeker.met.partner) return false;
-    const Vec dx = batch_.placeAt(i, now_) - seeker.x;
-    return dot(dx, seeker.met.normal) > Real(0.9) * (batch_.radius[i] + seeker.radius);
-  }
-
-  void takeEarliest(const Seeker& seeker, Found& found) {
-    findImpacts(batch_, seeker.x.data(), seeker.v.data(), seeker.radius, now_);
-    for (std::size_t i = 0; i < batch_.count; ++i) {
-      const Real time = now_ + batch_.wait[i];
-      if (time <= found.time && !justParted(seeker, i)) takeIfEarlier(batch_slots_[i], time, found);
-    }
+  // In straight relative motion two balls that have just met do not meet again. In a small periodic
+  // box another image of the partner may be in reach too, but not in the same direction.
+  bool justParted(const Search& search, Slot other) const {
+    if (other != search.met.partner) return false;
+    if (images_.empty()) return true;
+    const Vec dx = positionNow(other) - search.seeker.x;
+    const Real reach = bodies_[other].radius + search.seeker.radius;
+    return dot(dx, search.met.normal) > Real(0.9) * reach;
   }
 
   void takeIfEarlier(Slot other, Real time, Found& found) const {
@@ -781,34 +1071,43 @@ class EventDriven final : public Method {
   // Box faces are only met from the cells beside them; planes from anywhere.
   void considerWallsOf(Slot slot, Found& found) const {
     if (walls_.empty() || isFixed(slot)) return;
-    const Agenda& agenda = agendas_[slot];
+    if (listed_) {
+      for (std::uint32_t wall = 0; wall < walls_.size(); ++wall) considerWall(slot, wall, found);
+      return;
+    }
+    const Agenda<Real>& agenda = agendas_[slot];
     for (std::size_t axis = 0; axis < 3; ++axis) {
       for (const int direction : {-1, 1}) {
         if (!grid_.isWall(axis, agenda.level, agenda.cell[axis], direction)) continue;
         considerWall(slot, face_walls_[2 * axis + (direction > 0 ? 1 : 0)], found);
       }
     }
-    for (const std::uint32_t plane : planes_) {
-      considerWall(slot, static_cast<std::int32_t>(plane), found);
-    }
+    for (const std::uint32_t plane : planes_) considerWall(slot, plane, found);
   }
 
-  void considerWall(Slot slot, std::int32_t index, Found& found) const {
-    const Wall<Real>& wall = walls_[static_cast<std::size_t>(index)];
+  void considerWall(Slot slot, std::uint32_t index, Found& found) const {
+    const Wall<Real>& wall = walls_[index];
     Real pull = 0;
     if constexpr (kGravity) {
-      if (resting_[slot].includes(index)) return;
-      pull = dot(accelerations_[slot], wall.normal);
+      if (contacts_.isRestingOn(slot, static_cast<int>(index))) return;
+      pull = dot(contacts_.acceleration(slot), wall.normal);
     }
     const Real gap = dot(positionNow(slot), wall.normal) - wall.offset - bodies_[slot].radius;
     const Real time = now_ + timeToWall<Real>(gap, dot(velocityNow(slot), wall.normal), pull);
-    if (time < found.time) found = {time, kWall + static_cast<std::uint32_t>(index)};
+    if (time < found.time) found = {time, kWall + index};
   }
 
-  // When and where the ball leaves its cell. There is no way out through a wall.
+  // --- the way out of a ball's cell, or of the region around its home
+
+  const Lattice<Real>& cubesOf(Slot slot) const {
+    return listed_ ? regions_ : grid_.latticeOf(agendas_[slot].level);
+  }
+  const CellCoordinates& cubeOf(Slot slot) const {
+    return listed_ ? lists_.home(slot) : agendas_[slot].cell;
+  }
+
   void findCrossing(Slot slot) {
-    Agenda& agenda = agendas_[slot];
-    agenda.crossing_time = kNever<Real>;
+    agendas_[slot].crossing_time = kNever<Real>;
     if (isFixed(slot)) return;
     if constexpr (kGravity) {
       findCrossingFalling(slot);
@@ -819,21 +1118,20 @@ class EventDriven final : public Method {
 
   // Without a branch on signs, and with one division: a/b < c/d is tested as a d < c b.
   void findCrossingFlying(Slot slot) {
-    Agenda& agenda = agendas_[slot];
+    Agenda<Real>& agenda = agendas_[slot];
     const Vec x = positionNow(slot);
     const Vec& v = bodies_[slot].v;
     std::array<Real, 3> gap{};
     std::array<Real, 3> speed{};  // 0: never leaves that way
+    const Lattice<Real>& cubes = cubesOf(slot);
+    const CellCoordinates& cube = cubeOf(slot);
     for (std::size_t k = 0; k < 3; ++k) {
-      const GridAxis<Real>& axis = grid_.axis(k);
       const int i = static_cast<int>(k);
-      const Real half = grid_.edge(k, agenda.level) / 2;
-      const Real from_middle = x[i] - (axis.origin + Real(2 * agenda.cell[k] + 1) * half);
-      const Real towards = half - std::copysign(Real(1), v[i]) * from_middle;
+      const Real from_middle = x[i] - (cubes.first[k] + Real(cube[k]) * cubes.spacing[k]);
+      const Real towards = cubes.half[k] - std::copysign(from_middle, from_middle * v[i]);
       gap[k] = std::max(towards, std::numeric_limits<Real>::min());
-      const bool closed =
-          axis.flat || grid_.isWall(k, agenda.level, agenda.cell[k], v[i] < 0 ? -1 : 1);
-      speed[k] = closed ? Real(0) : std::abs(v[i]);
+      const std::int32_t end = cubes.end[k][v[i] < 0 ? 0 : 1];
+      speed[k] = cube[k] == end ? Real(0) : std::abs(v[i]);
     }
     std::size_t k = gap[1] * speed[0] < gap[0] * speed[1] ? 1 : 0;
     k = gap[2] * speed[k] < gap[k] * speed[2] ? 2 : k;
@@ -843,24 +1141,27 @@ class EventDriven final : public Method {
   }
 
   void findCrossingFalling(Slot slot) {
-    Agenda& agenda = agendas_[slot];
     const Vec x = positionNow(slot);
     const Vec v = velocityNow(slot);
+    const Lattice<Real>& cubes = cubesOf(slot);
+    const CellCoordinates& cube = cubeOf(slot);
     for (std::size_t k = 0; k < 3; ++k) {
-      const GridAxis<Real>& axis = grid_.axis(k);
-      if (axis.flat) continue;
       const int i = static_cast<int>(k);
-      const Real half = grid_.edge(k, agenda.level) / 2;
-      const Real from_middle = x[i] - (axis.origin + Real(2 * agenda.cell[k] + 1) * half);
-      const Real a = accelerations_[slot][i];
-      considerSide(agenda, k, -1, timeToWall<Real>(half + from_middle, v[i], a));
-      considerSide(agenda, k, 1, timeToWall<Real>(half - from_middle, -v[i], -a));
+      const Real half = cubes.half[k];
+      const Real from_middle = x[i] - (cubes.first[k] + Real(cube[k]) * cubes.spacing[k]);
+      const Real a = contacts_.acceleration(slot)[i];
+      if (cube[k] != cubes.end[k][0]) {
+        considerSide(slot, k, -1, timeToWall<Real>(half + from_middle, v[i], a));
+      }
+      if (cube[k] != cubes.end[k][1]) {
+        considerSide(slot, k, 1, timeToWall<Real>(half - from_middle, -v[i], -a));
+      }
     }
   }
 
-  void considerSide(Agenda& agenda, std::size_t axis, int direction, Real wait) const {
+  void considerSide(Slot slot, std::size_t axis, int direction, Real wait) {
+    Agenda<Real>& agenda = agendas_[slot];
     if (!(now_ + wait < agenda.crossing_time)) return;
-    if (grid_.isWall(axis, agenda.level, agenda.cell[axis], direction)) return;
     agenda.crossing_time = now_ + wait;
     agenda.crossing_axis = static_cast<std::uint8_t>(axis);
     agenda.crossing_direction = static_cast<std::int8_t>(direction);
@@ -885,43 +1186,53 @@ class EventDriven final : public Method {
     log_->add(collision);
   }
 
-  static constexpr Real kEventsPerBucket = 1;
-  static constexpr std::uint64_t kImpactsPerLayout = 8;  // ball-ball impacts per ball
+  static constexpr Real kEventsPerBucket = 8;
+  static constexpr std::size_t kCachedBalls = 4000;         // fit into a core's own caches
+  static constexpr std::uint64_t kCrossingsPerLayout = 16;  // a ball
   static constexpr std::int32_t kFarthestCell = 1 << 30;
 
   Surroundings surroundings_;
-  Vec gravity_;
+  SimultaneousImpacts policy_;
   Real restitution_;
   std::vector<Wall<Real>> walls_;
-  std::array<std::int32_t, 6> face_walls_{};  // indices into walls_, by face
-  std::vector<std::uint32_t> planes_;         // indices into walls_
-  Vec period_ = Vec::Zero();                  // m; 0: that axis does not wrap
-  Real smallest_period_ = kNever<Real>;       // m
-  std::array<Vec, 27> image_shift_;           // m
+  std::array<std::uint32_t, 6> face_walls_{};  // indices into walls_, by face
+  std::vector<std::uint32_t> planes_;          // indices into walls_
+  Vec period_ = Vec::Zero();                   // m; 0: that axis does not wrap
 
   // One entry a slot; a slot is reused when its ball is removed.
-  HugePageVector<Body> bodies_;
-  HugePageVector<Agenda> agendas_;
-  std::vector<ImpactHistory<Real>> histories_;
-  HugePageVector<Vec> accelerations_;  // m/s^2; only with gravity
-  std::vector<RestingContacts> resting_;
-  std::vector<Slot> slots_;  // of the balls there are, by ascending id
+  HugePageVector<Body<Real>> bodies_;
+  HugePageVector<Agenda<Real>> agendas_;
+  std::vector<ImpactHistory<Real>> histories_;  // only where restitution is below 1
+  ImpactHistory<Real> no_history_;              // stands in for them elsewhere
+  Contacts<Real> contacts_;                     // only with gravity
+  std::vector<Slot> slots_;                     // of the balls there are, by ascending id
   std::vector<Slot> free_slots_;
 
   CellGrid<Real> grid_;
+  NeighbourLists lists_;
+  bool listed_ = false;           // who is near is told by lists_, else by grid_ alone
+  Lattice<Real> regions_;         // of the lists
+  CellCoordinates region_width_;  // in points of their lattice
+  Real list_reach_ = 0;           // m, largest sum of radii that the lists allow for
+  std::size_t list_capacity_ = 11;
   Real coarsest_edge_ = 0;  // m, the shortest edge of a cell of the coarsest level
   std::size_t balls_at_layout_ = 0;
-  std::uint64_t collisions_at_layout_ = 0;
-  bool ready_ = false;  // grid and queue hold all balls
+  std::uint64_t crossings_ = 0;  // out of a cell or region
+  std::uint64_t crossings_at_layout_ = 0;
+  bool ready_ = false;  // grid, lists and queue hold all balls
   EventQueue<Real> queue_;
-  Candidates candidates_;              // scratch of a search
-  PairBatch<Real> batch_;              // scratch of a search
-  const Slot* batch_slots_ = nullptr;  // of the batch's lanes
+
+  PairSpace<Real> space_;
+  PairSearch<Real> search_pairs_ = nullptr;
+  std::vector<Vec> images_;       // m, shifts of a ball to be looked at: none but in small boxes
+  Candidates candidates_;         // scratch of a search
+  std::vector<Slot> neighbours_;  // scratch of a new list
 
   Time origin_;   // when this year began
   Real now_ = 0;  // s, in this year
   Time reached_;  // what now() tells
   std::uint64_t events_at_new_year_ = 0;
+  OrderWatch<Real> watch_;
   Statistics statistics_;
   CollisionLog* log_ = nullptr;
 };

@@ -1,10 +1,10 @@
 // The event queue: one event a ball, in a calendar of buckets.
 //
-// Events of the current year wait in the bucket of their time, unsorted; only the bucket at hand is
-// kept in order, in a small heap; events beyond the year wait in one list until it turns. Both
-// insertion and removal are O(1) (Paul, "A complexity O(1) priority queue for event driven
-// molecular dynamics simulations", 2007). Nothing is allocated per event: a ball's entry is a pair
-// of links.
+// Events of the current year wait in the bucket of their time, unsorted, until it is opened and
+// sorted; those that come late into the bucket at hand wait in a heap beside it; events beyond the
+// year wait in one list until it turns. Both insertion and removal are O(1) (Paul, "A complexity
+// O(1) priority queue for event driven molecular dynamics simulations", 2007). Nothing is allocated
+// per event: a ball's agenda is its entry, and carries the links.
 //
 // Times are seconds since the year began. When the year turns the owner moves its clocks back by
 // whole years, a power of two each, so that times stay small and fine however long the run is.
@@ -12,130 +12,162 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cmath>
 #include <cstdint>
 #include <limits>
-#include <utility>
 #include <vector>
 
+#include "ball_sim/ball.hpp"
+#include "event_driven/cell_grid.hpp"
 #include "event_driven/huge_page_vector.hpp"
+#include "event_driven/pair_search.hpp"
 
 namespace ball_sim::core {
 
-/// Index of a ball in a method's arrays.
-using Slot = std::uint32_t;
-constexpr Slot kNoSlot = ~Slot{0};
+/// Instead of a previous slot in a list of the queue.
+constexpr Slot kFirst = ~Slot{0};          ///< first of its list
+constexpr Slot kNotQueued = ~Slot{0} - 1;  ///< in none
+constexpr Slot kAtHand = ~Slot{0} - 2;     ///< in the bucket at hand
 
-/// Decides between events at one instant; the smaller goes first.
-using TieOrder = std::pair<std::int64_t, std::int64_t>;
+/// What only the ball itself needs, in one cache line of doubles: its next event, its cell, its
+/// name and mass, and its place in the queue.
+template <class Real>
+struct alignas(64) Agenda {
+  Real impact_time = kNever<Real>;    ///< s, in this year
+  Real crossing_time = kNever<Real>;  ///< s, in this year: out of its cell or region
+  double mass = 0;                    ///< kg
+  std::uint32_t partner = 0;          ///< slot of whom it meets, or a wall
+  std::uint32_t partner_version = 0;  ///< the partner's version when the impact was found
+  std::uint32_t version = 0;          ///< counts the changes of this ball's trajectory
+  BallId id = 0;
+  CellCoordinates cell = {0, 0, 0};
+  Slot next = kNoSlot;         ///< in the list of its bucket
+  Slot previous = kNotQueued;  ///< likewise, or one of the marks above
+  std::uint8_t level = 0;      ///< index into the grid's levels
+  std::uint8_t crossing_axis = 0;
+  std::int8_t crossing_direction = 0;  ///< -1 or +1
+
+  Real due() const { return std::min(impact_time, crossing_time); }
+};
+static_assert(sizeof(Agenda<double>) == 64);
 
 /// @tparam Real  double or long double
 template <class Real>
 class EventQueue {
  public:
   /// How many buckets ahead a ball is announced, each time for the next step of the fetching.
-  static constexpr std::uint32_t kSoon = 8;
-  static constexpr std::uint32_t kSooner = 5;
-  static constexpr std::uint32_t kNext = 2;
+  static constexpr std::uint32_t kSoon = 3;
+  static constexpr std::uint32_t kSooner = 2;
+  static constexpr std::uint32_t kNext = 1;
+
+  /// @param agendas  by slot; outlive the queue
+  explicit EventQueue(HugePageVector<Agenda<Real>>& agendas) : agendas_(agendas) {}
 
   /// Forgets all entries and sets the calendar.
   /// @param bucket_width  s, a power of two
   /// @param buckets       a power of two
-  /// @param slots         size of the owner's arrays
-  void reset(Real bucket_width, std::uint32_t buckets, std::size_t slots) {
+  void reset(Real bucket_width, std::uint32_t buckets) {
     width_ = bucket_width;
     per_width_ = 1 / bucket_width;
     buckets_ = buckets;
-    heads_.assign(buckets + kFarAhead, kNoSlot);  // one can look ahead without asking
-    entries_.assign(slots, Entry{});
+    heads_.assign(buckets + kFarAhead + 1, kNoSlot);  // one can look ahead without asking
+    for (Agenda<Real>& agenda : agendas_) agenda.previous = kNotQueued;
     beyond_ = kNoSlot;
     current_ = 0;
-    heap_.clear();
-    heap_.reserve(256);
+    clearBucket();
     in_year_ = 0;
   }
 
-  /// Makes room for slots up to `slots`.
-  void resize(std::size_t slots) { entries_.resize(slots); }
-
   Real yearLength() const { return width_ * Real(buckets_); }
   Real bucketWidth() const { return width_; }
+  std::uint32_t buckets() const { return buckets_; }
   std::size_t bytes() const {
-    return heads_.capacity() * sizeof(Slot) + entries_.capacity() * sizeof(Entry) +
-           heap_.capacity() * sizeof(HeapEntry);
+    return heads_.capacity() * sizeof(Slot) +
+           (bucket_.capacity() + sorted_.capacity() + late_.capacity()) * sizeof(Entry);
   }
 
-  /// Adds a ball that is not queued.
-  /// @param due    s in this year, not before the last event taken out
-  /// @param order  order(slot) gives the TieOrder of a ball's event
+  /// Adds a ball that is not queued. Its due() must not change while it is, and not be before the
+  /// last event taken out.
+  /// @param order  order(slot): of events at one instant the one with the smaller id goes first
   template <class Order>
-  void insert(Slot slot, Real due, Order order) {
-    entries_[slot].due = due;
-    const Real position = due * per_width_;
-    if (!(position < Real(buckets_))) {
-      link(slot, beyond_, kBeyondYear);
+  void insert(Slot slot, Order order) {
+    const Real due = agendas_[slot].due();
+    if (isBeyondYear(due)) {
+      link(slot, beyond_);
       return;
     }
     ++in_year_;
-    const auto bucket = static_cast<std::uint32_t>(position);
+    const std::uint32_t bucket = bucketOf(due);
     if (bucket <= current_) {
-      addToHeap(slot, order);
-      std::push_heap(heap_.begin(), heap_.end());
+      agendas_[slot].previous = kAtHand;
+      late_.push_back({due, order(slot), slot});
+      std::push_heap(late_.begin(), late_.end(), isLater);
     } else {
-      link(slot, heads_[bucket], static_cast<std::int32_t>(bucket));
+      link(slot, heads_[bucket]);
     }
   }
 
   /// Takes a ball out, queued or not.
   void remove(Slot slot) {
-    Entry& entry = entries_[slot];
-    if (entry.bucket == kNotQueued) return;
-    if (entry.bucket != kBeyondYear) --in_year_;
-    if (entry.bucket != kInHeap) unlink(entry);
-    entry.bucket = kNotQueued;  // what the heap holds of it is skipped later
+    Agenda<Real>& agenda = agendas_[slot];
+    if (agenda.previous == kNotQueued) return;
+    const Real due = agenda.due();
+    const bool beyond = isBeyondYear(due);
+    if (!beyond) --in_year_;
+    if (agenda.previous != kAtHand) unlink(agenda, beyond ? beyond_ : heads_[bucketOf(due)]);
+    agenda.previous = kNotQueued;  // what the open bucket holds of it is skipped later
   }
 
-  /// The ball whose event is next, if that is due by `limit`; kNoSlot if not, or if the year is
-  /// over. The ball stays queued.
+  /// Looks for the next event.
   /// @param expect  expect(slot, buckets ahead): a ball comes up kSoon, kSooner, kNext
+  /// @return whether there is one that is due by `limit`
   template <class Order, class Expect>
-  Slot peek(Real limit, Order order, Expect expect) {
+  bool isDue(Real limit, Order order, Expect expect) {
     while (true) {
-      while (!heap_.empty()) {
-        const HeapEntry& top = heap_.front();
-        if (isLive(top)) return top.due <= limit ? top.slot : kNoSlot;
-        popHeap();
+      while (position_ < sorted_.size() || !late_.empty()) {
+        const Entry& first = firstAtHand();
+        if (isLive(first, order)) return first.due <= limit;
+        skip();
       }
-      if (in_year_ == 0 || current_ + 1 == buckets_) return kNoSlot;
-      if (Real(current_ + 1) * width_ > limit) return kNoSlot;
-      ++current_;
-      openBucket(order, expect);
+      if (in_year_ == 0) return false;
+      const std::uint32_t last = isBeyondYear(limit) ? buckets_ - 1 : bucketOf(limit);
+      do {
+        if (current_ >= last) return false;
+        ++current_;
+        if (agendas_.size() > kCachedBalls) announce(expect);
+      } while (heads_[current_] == kNoSlot);
+      openBucket(order);
     }
   }
 
-  /// Takes out the ball that peek() just named, and tells when it was due.
-  Real pop() {
-    const HeapEntry top = heap_.front();
-    entries_[top.slot].bucket = kNotQueued;
+  struct Due {
+    Slot slot;
+    Real time;  // s
+  };
+
+  /// Takes out the ball whose event isDue() has just found.
+  /// @param later  later(slot): decides between events of one order, the smaller goes first
+  template <class Order, class Later>
+  Due pop(Order order, Later later) {
+    Entry first = firstAtHand();
+    skip();
+    if (isTied(first)) first = leastOfTies(first, order, later);
+    agendas_[first.slot].previous = kNotQueued;
     --in_year_;
-    popHeap();
-    return top.due;
+    return {first.slot, first.due};
   }
 
-  /// Begins a new year `by` seconds later; this one must be empty.
-  /// @param by  whole years
+  /// Begins a new year; this one must be empty, and the clocks of the agendas moved already.
   template <class Order>
-  void turnYear(Real by, Order order) {
+  void turnYear(Order order) {
     assert(in_year_ == 0);
     current_ = 0;
-    heap_.clear();
+    clearBucket();
     Slot slot = beyond_;
     beyond_ = kNoSlot;
     while (slot != kNoSlot) {
-      Entry& entry = entries_[slot];
-      const Slot next = entry.next;
-      entry.bucket = kNotQueued;
-      insert(slot, entry.due - by, order);
+      const Slot next = agendas_[slot].next;
+      agendas_[slot].previous = kNotQueued;
+      insert(slot, order);
       slot = next;
     }
   }
@@ -143,106 +175,160 @@ class EventQueue {
   /// The earliest time of all events beyond the year; infinity when there are none.
   Real earliestBeyond() const {
     Real earliest = std::numeric_limits<Real>::infinity();
-    for (Slot slot = beyond_; slot != kNoSlot; slot = entries_[slot].next) {
-      earliest = std::min(earliest, entries_[slot].due);
+    for (Slot slot = beyond_; slot != kNoSlot; slot = agendas_[slot].next) {
+      earliest = std::min(earliest, agendas_[slot].due());
     }
     return earliest;
   }
 
  private:
-  static constexpr std::int32_t kNotQueued = -1;
-  static constexpr std::int32_t kInHeap = -2;
-  static constexpr std::int32_t kBeyondYear = -3;
-
-  static constexpr std::uint32_t kFarAhead = 12;
+  static constexpr std::uint32_t kFarAhead = 4;
   // Up to so many balls all is in the cache anyway, and to fetch ahead would only cost.
-  static constexpr std::size_t kCachedEntries = 20000;
+  static constexpr std::size_t kCachedBalls = 20000;
 
   struct Entry {
-    Real due = 0;  // s, in this year
-    Slot next = kNoSlot;
-    Slot previous = kNoSlot;
-    std::int32_t bucket = kNotQueued;  // or one of the marks above
-    std::uint32_t stamp = 0;           // tells the heap's entry from those left behind
-  };
-
-  struct HeapEntry {
     Real due;
-    TieOrder order;
+    BallId order;
     Slot slot;
-    std::uint32_t stamp;
 
-    // The standard heap has the largest on top: the earliest is the largest.
-    bool operator<(const HeapEntry& other) const {
-      return due != other.due ? due > other.due : order > other.order;
+    bool operator<(const Entry& other) const {
+      return due != other.due ? due < other.due : order < other.order;
     }
+    bool ties(const Entry& other) const { return (due == other.due) & (order == other.order); }
   };
+  // The standard heap has the largest on top.
+  static bool isLater(const Entry& a, const Entry& b) { return b < a; }
 
-  bool isLive(const HeapEntry& top) const {
-    const Entry& entry = entries_[top.slot];
-    return entry.bucket == kInHeap && entry.stamp == top.stamp;
+  bool isBeyondYear(Real due) const { return !(due * per_width_ < Real(buckets_)); }
+  std::uint32_t bucketOf(Real due) const {
+    return due > 0 ? static_cast<std::uint32_t>(due * per_width_) : 0;
+  }
+
+  // Not left behind by a ball that was taken out, perhaps to come back with another event.
+  template <class Order>
+  bool isLive(const Entry& entry, Order order) const {
+    const Agenda<Real>& agenda = agendas_[entry.slot];
+    return agenda.previous == kAtHand && agenda.due() == entry.due &&
+           order(entry.slot) == entry.order;
+  }
+
+  // --- the bucket at hand
+
+  void clearBucket() {
+    sorted_.clear();
+    position_ = 0;
+    late_.clear();
+  }
+
+  bool lateIsFirst() const {
+    return !late_.empty() && (position_ == sorted_.size() || late_.front() < sorted_[position_]);
+  }
+  const Entry& firstAtHand() const { return lateIsFirst() ? late_.front() : sorted_[position_]; }
+
+  void skip() {
+    if (!lateIsFirst()) {
+      ++position_;
+      return;
+    }
+    std::pop_heap(late_.begin(), late_.end(), isLater);
+    late_.pop_back();
+  }
+
+  bool isTied(const Entry& entry) const {
+    return (position_ < sorted_.size() && sorted_[position_].ties(entry)) ||
+           (!late_.empty() && late_.front().ties(entry));
+  }
+
+  // Of the live entries that tie with `first`, the one to go first; the others stay.
+  template <class Order, class Later>
+  Entry leastOfTies(const Entry& first, Order order, Later later) {
+    std::vector<Entry> tied = {first};
+    while (isTied(first)) {
+      if (isLive(firstAtHand(), order)) tied.push_back(firstAtHand());
+      skip();
+    }
+    const auto least =
+        std::min_element(tied.begin(), tied.end(), [&](const Entry& a, const Entry& b) {
+          return later(a.slot) != later(b.slot) ? later(a.slot) < later(b.slot) : a.slot < b.slot;
+        });
+    const Entry found = *least;
+    for (const Entry& entry : tied) {
+      if (entry.slot == found.slot) continue;
+      late_.push_back(entry);
+      std::push_heap(late_.begin(), late_.end(), isLater);
+    }
+    return found;
   }
 
   template <class Order>
-  void addToHeap(Slot slot, Order order) {
-    Entry& entry = entries_[slot];
-    entry.bucket = kInHeap;
-    heap_.push_back({entry.due, order(slot), slot, ++entry.stamp});
-  }
-
-  void popHeap() {
-    std::pop_heap(heap_.begin(), heap_.end());
-    heap_.pop_back();
-  }
-
-  template <class Order, class Expect>
-  void openBucket(Order order, Expect expect) {
-    if (entries_.size() > kCachedEntries) announce(expect);
-    for (Slot slot = heads_[current_]; slot != kNoSlot; slot = entries_[slot].next) {
-      addToHeap(slot, order);
+  void openBucket(Order order) {
+    bucket_.clear();
+    for (Slot slot = heads_[current_]; slot != kNoSlot; slot = agendas_[slot].next) {
+      agendas_[slot].previous = kAtHand;
+      bucket_.push_back({agendas_[slot].due(), order(slot), slot});
     }
     heads_[current_] = kNoSlot;
-    std::make_heap(heap_.begin(), heap_.end());
+    sortBucket();
+    position_ = 0;
+  }
+
+  // A small bucket is sorted by counting for each entry how many come before it: there is no branch
+  // in this to be foretold wrongly.
+  void sortBucket() {
+    constexpr std::size_t kSmall = 24;
+    const std::size_t count = bucket_.size();
+    sorted_.resize(count);
+    if (count > kSmall) {
+      std::copy(bucket_.begin(), bucket_.end(), sorted_.begin());
+      std::sort(sorted_.begin(), sorted_.end());
+      return;
+    }
+    for (const Entry& entry : bucket_) {
+      std::size_t before = 0;
+      for (const Entry& other : bucket_) {
+        const bool same_but_first = (other.due == entry.due) & (other.order < entry.order);
+        const bool same_but_lower = other.ties(entry) & (other.slot < entry.slot);
+        before +=
+            static_cast<std::size_t>((other.due < entry.due) | same_but_first | same_but_lower);
+      }
+      sorted_[before] = entry;
+    }
   }
 
   template <class Expect>
   void announce(Expect expect) {
     const Slot far = heads_[current_ + kFarAhead];
-    if (far != kNoSlot) __builtin_prefetch(&entries_[far]);
+    if (far != kNoSlot) __builtin_prefetch(&agendas_[far]);
     for (const std::uint32_t ahead : {kSoon, kSooner, kNext}) {
-      for (Slot s = heads_[current_ + ahead]; s != kNoSlot; s = entries_[s].next) expect(s, ahead);
+      for (Slot s = heads_[current_ + ahead]; s != kNoSlot; s = agendas_[s].next) expect(s, ahead);
     }
   }
 
-  void link(Slot slot, Slot& head, std::int32_t bucket) {
-    Entry& entry = entries_[slot];
-    entry.bucket = bucket;
-    entry.previous = kNoSlot;
-    entry.next = head;
-    if (head != kNoSlot) entries_[head].previous = slot;
+  void link(Slot slot, Slot& head) {
+    Agenda<Real>& agenda = agendas_[slot];
+    agenda.previous = kFirst;
+    agenda.next = head;
+    if (head != kNoSlot) agendas_[head].previous = slot;
     head = slot;
   }
 
-  void unlink(const Entry& entry) {
-    if (entry.next != kNoSlot) entries_[entry.next].previous = entry.previous;
-    if (entry.previous != kNoSlot) {
-      entries_[entry.previous].next = entry.next;
-    } else if (entry.bucket == kBeyondYear) {
-      beyond_ = entry.next;
-    } else {
-      heads_[static_cast<std::size_t>(entry.bucket)] = entry.next;
-    }
+  void unlink(const Agenda<Real>& agenda, Slot& head) {
+    if (agenda.next != kNoSlot) agendas_[agenda.next].previous = agenda.previous;
+    (agenda.previous != kFirst ? agendas_[agenda.previous].next : head) = agenda.next;
   }
 
+  HugePageVector<Agenda<Real>>& agendas_;
   Real width_ = 1;
   Real per_width_ = 1;
-  HugePageVector<Slot> heads_;     // of the buckets' lists
-  HugePageVector<Entry> entries_;  // by slot
-  Slot beyond_ = kNoSlot;          // head of the list of events beyond the year
+  HugePageVector<Slot> heads_;  // of the buckets' lists
+  Slot beyond_ = kNoSlot;       // head of the list of events beyond the year
   std::uint32_t buckets_ = 0;
   std::uint32_t current_ = 0;
-  std::vector<HeapEntry> heap_;  // events of the current bucket and those that came late into it
-  std::size_t in_year_ = 0;      // events in buckets and heap
+  std::vector<Entry> bucket_;  // scratch: as it was found
+  std::vector<Entry> sorted_;  // the bucket at hand
+  std::size_t position_ = 0;   // of the next in sorted_
+  std::vector<Entry> late_;    // heap of those that came late into the bucket at hand
+  std::size_t in_year_ = 0;    // events queued that are not beyond the year
 };
 
 }  // namespace ball_sim::core

@@ -58,10 +58,51 @@ Real coarsestEdge(const CellGrid<Real>& grid) {
   return shortest;
 }
 
+/// Whether neighbour lists pay: they do in dense fluids of balls of about one size, where a ball
+/// meets the same few others again and again. Measured in doc/performance.md.
+template <class Real>
+bool wantsLists(const Surroundings& surroundings, const std::vector<GridBall<Real>>& balls) {
+  constexpr std::size_t kFewest = 100;  // balls
+  constexpr double kMostUnequal = 1.5;  // ratio of radii
+  constexpr double kDense = 0.3;        // packing fraction
+  if (balls.size() < kFewest) return false;
+  Real smallest = kNever<Real>;
+  Real largest = 0;
+  double filled = 0;
+  const bool planar = surroundings.planar();
+  for (const GridBall<Real>& ball : balls) {
+    smallest = std::min(smallest, ball.radius);
+    largest = std::max(largest, ball.radius);
+    const auto r = double(ball.radius);
+    filled += planar ? 3.14159265358979 * r * r : 4.18879020478639 * r * r * r;
+  }
+  if (largest > Real(kMostUnequal) * smallest) return false;
+  double space = 1;
+  for (int k = 0; k < (planar ? 2 : 3); ++k) {
+    Real low = 0;
+    Real high = 0;
+    detail::extent(surroundings, balls, k, low, high);
+    space *= double(high - low);
+  }
+  return filled > kDense * space;
+}
+
+/// Whether of a ball's images in a periodic box only the nearest can be met before a crossing:
+/// balls in adjacent cells are less than two cells apart, so four cells along each axis are enough.
+template <class Real>
+bool nearestImagesSuffice(const CellGrid<Real>& grid) {
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (grid.axis(k).periodic && grid.axis(k).cells < 4) return false;
+  }
+  return true;
+}
+
 /// @param balls  finite; may be empty
+/// @param room   m, >= 0: cells are so much wider than the largest ball; above 0 there is but one
+///               level
 template <class Real>
 CellGrid<Real> layOutGrid(const Surroundings& surroundings,
-                          const std::vector<GridBall<Real>>& balls) {
+                          const std::vector<GridBall<Real>>& balls, Real room) {
   using std::floor;
   using std::pow;
   std::array<GridAxis<Real>, 3> axes;
@@ -85,7 +126,7 @@ CellGrid<Real> layOutGrid(const Surroundings& surroundings,
   // The coarsest cells take the largest balls, and are no finer than the balls are many.
   Real edge = 0;
   for (const GridBall<Real>& ball : balls) {
-    edge = std::max(edge, Real(2 * ball.radius * Real(kCellMargin)));
+    edge = std::max(edge, Real(2 * ball.radius * Real(kCellMargin) + room));
   }
   const Real roomiest = Real(balls.size()) / Real(kBallsPerCell) + 1;  // cells
   edge = std::max(edge, pow(volume / roomiest, 1 / Real(dimension)));
@@ -108,6 +149,8 @@ CellGrid<Real> layOutGrid(const Surroundings& surroundings,
     axis.edge = edge;
     if (axis.upper_wall) axis.origin = low[k] + length[k] - Real(axis.cells) * edge;
   }
+
+  if (room > 0) return CellGrid<Real>(axes, {0});
 
   // Finer levels, for balls at most half as wide, where enough of them share the finest cells.
   Real shortest = kNever<Real>;

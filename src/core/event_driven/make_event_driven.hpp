@@ -8,6 +8,7 @@
 namespace ball_sim::core {
 
 /// @param surroundings  checked; without gravity nothing of gravity is computed
-std::unique_ptr<Method> makeEventDriven(const Surroundings& surroundings, Precision precision);
+std::unique_ptr<Method> makeEventDriven(const Surroundings& surroundings,
+                                        const MethodSettings& settings);
 
 }  // namespace ball_sim::core

@@ -1,0 +1,314 @@
+#include "continuous/swept_grid.hpp"
+
+namespace ball_sim::core {
+namespace {
+
+// Cells are this share of the reach of a level's largest ball wide, and half of it along the rows.
+constexpr double kEdgeOfReach = 1.6;
+constexpr double kBallsPerCell = 0.5;  // and hold no fewer
+
+// What testing a path costs, in searches of a level that find nothing: measured.
+constexpr double kCostOfTest = 0.05;
+
+// The longest path of a frame, and a little more, so that a ball that is hit may become the
+// fastest.
+constexpr double kMoreWay = 1.125;
+
+// Share of the largest coordinate that single precision may falsify in a path: 16 roundings.
+constexpr double kMargin = 0x1p-20;
+
+// Cells from the origin of an open axis; further away all balls share one.
+constexpr double kFarthestCell = 0x1p30;
+
+double power(double x, int n) { return n == 3 ? x * x * x : (n == 2 ? x * x : x); }
+
+// Balls within reach of a ball, of so many in a volume.
+double occupancy(double count, double reach, int dimension, double volume) {
+  return std::min(count, count * power(2 * reach, dimension) / volume);
+}
+
+}  // namespace
+
+double SweptGrid::volume() const {
+  double volume = 1;
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (axes_[k].kind != SweptAxis::Kind::flat) volume *= extent_[k];
+  }
+  return volume;
+}
+
+void SweptGrid::chooseLevels(const std::array<Bin, kBins>& bins) {
+  // From fine to coarse: what is not worth a level of its own goes with the next coarser one.
+  levels_.clear();
+  groups_.clear();
+  for (std::size_t i = 0; i < bins.size(); ++i) {
+    const Bin& bin = bins[i];
+    if (bin.count == 0) continue;
+    if (!groups_.empty()) {
+      const Bin& finer = groups_.back();
+      const double more = occupancy(finer.count, 2 * bin.reach, dimension(), volume()) -
+                          occupancy(finer.count, 2 * finer.reach, dimension(), volume());
+      if (kCostOfTest * finer.count * more <= finer.count + bin.count) {
+        groups_.back() = {finer.count + bin.count, bin.reach};
+        continue;
+      }
+      levels_.back().top = std::ldexp(1.0, static_cast<int>(i) - 1 - kBins / 2);
+    }
+    groups_.push_back(bin);
+    levels_.emplace_back();
+  }
+  if (levels_.empty()) {
+    levels_.emplace_back();
+    groups_.push_back({0, 1});
+  }
+  unit_ = groups_.back().reach;
+  per_unit_ = 1 / unit_;
+  cells_ = 0;
+  for (std::size_t i = 0; i < levels_.size(); ++i) {
+    cut(levels_[i], groups_[i]);
+    levels_[i].first_cell = cells_;
+    cells_ +=
+        static_cast<std::uint32_t>(levels_[i].cells[0] * levels_[i].cells[1] * levels_[i].cells[2]);
+  }
+  chooseSeekers();
+}
+
+void SweptGrid::cut(Level& level, const Bin& bin) const {
+  const double most = bin.count / kBallsPerCell + 8;
+  double edge = kEdgeOfReach * bin.reach;
+  const auto countAlong = [&](std::size_t k) -> double {
+    if (axes_[k].kind == SweptAxis::Kind::flat) return 1;
+    const double wanted = std::max(1.0, std::floor(extent_[k] / edge * (k == 0 ? 2 : 1)));
+    if (axes_[k].kind != SweptAxis::Kind::open) return wanted;
+    return std::exp2(std::ceil(std::log2(std::max(wanted, 4.0))));
+  };
+  while (countAlong(0) * countAlong(1) * countAlong(2) > std::max(2 * most, 64.0)) edge *= 1.125;
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (axes_[k].kind == SweptAxis::Kind::flat) continue;
+    const double count = countAlong(k);
+    level.cells[k] = static_cast<Cell>(count);
+    const bool open = axes_[k].kind == SweptAxis::Kind::open;
+    const double width = open ? (k == 0 ? edge / 2 : edge) : axes_[k].length / count;
+    level.inverse_edge[k] = unit_ / width;
+    const bool closed = axes_[k].kind == SweptAxis::Kind::closed;
+    level.low[k] = closed ? 0 : -kFarthestCell;
+    level.high[k] = closed ? count - 1 : kFarthestCell;
+  }
+}
+
+// Of two levels the one looks for the other's balls for which that is less work.
+void SweptGrid::chooseSeekers() {
+  const std::size_t count = levels_.size();
+  seeks_.assign(count * count, 0);
+  for (std::size_t fine = 0; fine < count; ++fine) {
+    for (std::size_t coarse = fine + 1; coarse < count; ++coarse) {
+      const double reach = groups_[fine].reach + groups_[coarse].reach;
+      const auto cost = [&](const Bin& seeker, const Bin& sought) {
+        const double rows = power(2 * reach / (kEdgeOfReach * sought.reach) + 1, dimension() - 1);
+        return seeker.count *
+               (rows / 9 + kCostOfTest * occupancy(sought.count, reach, dimension(), volume()));
+      };
+      const bool up = cost(groups_[fine], groups_[coarse]) <= cost(groups_[coarse], groups_[fine]);
+      seeks_[up ? fine * count + coarse : coarse * count + fine] = 1;
+    }
+  }
+}
+
+void SweptGrid::countWorkers(unsigned workers) {
+  if (workers_.size() != workers) workers_ = std::vector<Worker>(workers);
+}
+
+// From what the workers have counted to where in memory each of them puts each cell's balls.
+void SweptGrid::sumUp() {
+  std::uint32_t position = 0;
+  std::size_t key = 0;
+  for (Level& level : levels_) {
+    level.begin = position;
+    const std::size_t end =
+        level.first_cell +
+        static_cast<std::size_t>(level.cells[0] * level.cells[1] * level.cells[2]);
+    for (; key < end; ++key) {
+      for (Worker& worker : workers_) {
+        const std::uint32_t count = worker.ends[key + 1];
+        worker.ends[key + 1] = position;
+        position += count;
+      }
+    }
+    level.end = position;
+  }
+  double farthest = 0;
+  for (std::size_t k = 0; k < 3; ++k) farthest = std::max(farthest, axes_[k].length / unit_);
+  longest_ = 0;
+  for (const Worker& worker : workers_) {
+    farthest = std::max(farthest, double(worker.farthest));
+    longest_ = std::max(longest_, worker.longest);
+  }
+  margin_ = static_cast<float>(kMargin * (farthest + longest_ / unit_));
+  for (std::size_t i = 0; i < levels_.size(); ++i) {
+    double radius = 0;
+    for (const Worker& worker : workers_) radius = std::max(radius, worker.radius[i]);
+    levels_[i].reach = radius + longest_;
+    levels_[i].reach_later = radius + kMoreWay * 2 * longest_;
+    setNear(levels_[i]);
+  }
+}
+
+void SweptGrid::setNear(Level& level) const {
+  const double first = 2 * (level.reach / unit_ + double(margin_));
+  // To each side a path, which is within reach of its middle, and the reach of what it may meet.
+  const double widest = 4 * (level.reach_later / unit_ + double(margin_));
+  level.has_ahead = true;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double cells = std::min(std::ceil(first * level.inverse_edge[k]), kFarthestCell / 4);
+    level.near[k] = static_cast<Cell>(cells);
+    const bool open = axes_[k].kind == SweptAxis::Kind::open;
+    const double most = std::max(2 * cells, widest * level.inverse_edge[k]) + 2;
+    if (open && most >= static_cast<double>(level.cells[k])) level.has_ahead = false;
+  }
+}
+
+std::array<SweptGrid::Range, 3> SweptGrid::boxAround(const Level& level, const SweptSphere& sphere,
+                                                     const SweptBall& ball, double reach) const {
+  const std::array<float, 3> middle = {sphere.x, sphere.y, sphere.z};
+  const double around = (ball.radius + reach) * per_unit_ + 2 * double(margin_);
+  std::array<Range, 3> box{};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double half = std::abs(ball.half[k]) * per_unit_ + around;
+    box[k] = {cellOf(level, k, double(middle[k]) - half),
+              cellOf(level, k, double(middle[k]) + half)};
+    const Cell last = level.cells[k] - 1;
+    if (box[k].last - box[k].first >= last && axes_[k].kind == SweptAxis::Kind::open) {
+      box[k] = {0, last};
+    }
+  }
+  return box;
+}
+
+// Rows of cells beside each other; most often no axis is wrapped around.
+void SweptGrid::addRows(const Level& level, Cell z, Range y, Range x, SweptSearch& search) const {
+  const Image iz = imageOfCell(z, level.cells[2]);
+  const bool plain = iz.turns == 0 && y.first >= 0 && y.last < level.cells[1] && x.first >= 0 &&
+                     x.last < level.cells[0];
+  const std::uint32_t* layer =
+      begins() + level.first_cell +
+      static_cast<std::size_t>(iz.cell) * static_cast<std::size_t>(level.cells[1] * level.cells[0]);
+  if (!plain) {
+    for (Cell row = y.first; row <= y.last; ++row) {
+      const Image iy = imageOfCell(row, level.cells[1]);
+      addWrapped(level, layer + iy.cell * level.cells[0], x, shiftOf(1, iy.turns),
+                 shiftOf(2, iz.turns), search);
+    }
+    return;
+  }
+  const std::size_t most = search.run_count + static_cast<std::size_t>(y.last - y.first + 1);
+  if (search.runs.size() < most) search.runs.resize(2 * most);
+  for (Cell row = y.first; row <= y.last; ++row) {
+    const std::uint32_t* begins = layer + row * level.cells[0];
+    const LaneRun run = {begins[x.first], begins[x.last + 1], 0, 0, 0};
+    search.runs[search.run_count] = run;
+    search.run_count += run.begin < run.end ? 1 : 0;
+    search.lane_count += run.end - run.begin;
+  }
+}
+
+// The cells of a row as they go on from image to image.
+void SweptGrid::addWrapped(const Level& level, const std::uint32_t* begins, Range x, float sy,
+                           float sz, SweptSearch& search) const {
+  const Cell count = level.cells[0];
+  for (Cell first = x.first; first <= x.last;) {
+    const Image image = imageOfCell(first, count);
+    const Cell last = std::min(x.last, image.turns * count + count - 1);
+    const LaneRun run = {begins[image.cell], begins[last - image.turns * count + 1],
+                         shiftOf(0, image.turns), sy, sz};
+    if (search.runs.size() <= search.run_count) search.runs.resize(2 * search.run_count + 64);
+    search.runs[search.run_count] = run;
+    search.run_count += run.begin < run.end ? 1 : 0;
+    search.lane_count += run.end - run.begin;
+    first = last + 1;
+  }
+}
+
+void SweptGrid::run(const SweptSphere& sphere, SweptSearch& search) const {
+  if (search.hits.size() < search.lane_count) search.hits.resize(2 * search.lane_count);
+  search.count =
+      findOverlaps(lanes_, sphere, search.runs.data(), search.run_count, search.hits.data());
+}
+
+void SweptGrid::findInBox(const Level& level, const SweptBall& ball, double reach,
+                          SweptSearch& search) const {
+  search.run_count = search.lane_count = 0;
+  search.ahead_of = SweptSearch::kNoCell;
+  const SweptSphere sphere = sphereOf(ball);
+  const std::array<Range, 3> box = boxAround(level, sphere, ball, reach);
+  for (Cell z = box[2].first; z <= box[2].last; ++z) addRows(level, z, box[1], box[0], search);
+  run(sphere, search);
+}
+
+void SweptGrid::findAhead(std::size_t position, std::size_t level, SweptSearch& search) const {
+  const Level& own = levels_[level];
+  const std::uint32_t key = keys_[slots_[position]];
+  if (key != search.ahead_of) runsAhead(key, own, search);
+  if (own.has_ahead) search.runs.front().begin = static_cast<std::uint32_t>(position) + 1;
+  run(first_[position], search);
+  if (own.has_ahead) return;
+  const auto behind = [position](const LaneHit& hit) { return hit.lane <= position; };
+  const auto end = std::remove_if(
+      search.hits.begin(), search.hits.begin() + static_cast<std::ptrdiff_t>(search.count), behind);
+  search.count = static_cast<std::size_t>(end - search.hits.begin());
+}
+
+// Ahead is: the rest of the own row, then the rows that follow; or everywhere, where a search may
+// reach around an open axis.
+void SweptGrid::runsAhead(std::uint32_t key, const Level& level, SweptSearch& search) const {
+  search.run_count = search.lane_count = 0;
+  search.ahead_of = key;
+  const auto index = static_cast<Cell>(key - level.first_cell);
+  const Cell x = index % level.cells[0];
+  const Cell y = index / level.cells[0] % level.cells[1];
+  const Cell z = index / level.cells[0] / level.cells[1];
+  const Range along_x = nearOf(level, 0, x);
+  const Range along_y = nearOf(level, 1, y);
+  const Range along_z = nearOf(level, 2, z);
+  if (level.has_ahead) {
+    addRows(level, z, {y, y}, {x, along_x.last}, search);
+    addRows(level, z, {y + 1, along_y.last}, along_x, search);
+  }
+  for (Cell layer = level.has_ahead ? z + 1 : along_z.first; layer <= along_z.last; ++layer) {
+    addRows(level, layer, along_y, along_x, search);
+  }
+}
+
+SweptGrid::Range SweptGrid::nearOf(const Level& level, std::size_t k, Cell cell) const {
+  const Cell last = level.cells[k] - 1;
+  Range range = {cell - level.near[k], cell + level.near[k]};
+  if (axes_[k].kind == SweptAxis::Kind::closed) {
+    range = {std::max(range.first, Cell{0}), std::min(range.last, last)};
+  }
+  if (axes_[k].kind == SweptAxis::Kind::open && range.last - range.first >= last) return {0, last};
+  return range;
+}
+
+std::array<int, 3> SweptGrid::imageOf(const LaneHit& hit, const SweptSearch& search) const {
+  const LaneRun& run = search.runs[hit.run];
+  const std::array<float, 3> shift = {run.sx, run.sy, run.sz};
+  std::array<int, 3> image = {0, 0, 0};
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (axes_[k].kind != SweptAxis::Kind::periodic) continue;
+    image[k] = static_cast<int>(std::lround(double(shift[k]) * unit_ / axes_[k].length));
+  }
+  return image;
+}
+
+bool SweptGrid::change(std::size_t p, const SweptBall& ball) {
+  const SweptSphere sphere = sphereOf(ball);
+  const SweptSphere& first = first_[p];
+  const double x = double(sphere.x - first.x), y = double(sphere.y - first.y),
+               z = double(sphere.z - first.z);
+  // Of the two margins that searches add, one is in the sphere's radius already.
+  const double limit = levels_[levelAt(p)].reach_later * per_unit_ + 1.5 * double(margin_);
+  if (!(std::sqrt(x * x + y * y + z * z) + double(sphere.r) <= limit)) return false;
+  lanes_.set(p, sphere);
+  return true;
+}
+
+}  // namespace ball_sim::core

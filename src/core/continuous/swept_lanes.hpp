@@ -1,0 +1,58 @@
+// Who may meet whom within a frame: a cheap test in single precision of one ball's bounding sphere
+// against many others', side by side. It may say yes where it is no, never no where it is yes.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "event_driven/huge_page_vector.hpp"
+
+namespace ball_sim::core {
+
+/// A sphere around all places that a ball takes in the rest of a frame, in a unit of the caller's.
+struct SweptSphere {
+  float x, y, z;
+  float r;  ///< with all that the numbers may be off by
+};
+
+/// Spheres side by side, one lane a ball.
+struct SweptLanes {
+  static constexpr std::size_t kWidth = 16;  ///< so many at most are read at once
+
+  HugePageVector<float> x, y, z, r;
+
+  void resize(std::size_t count) {
+    for (HugePageVector<float>* lane : {&x, &y, &z, &r}) {
+      lane->resize(count + kWidth);  // the last lanes are read in whole widths too
+    }
+  }
+
+  SweptSphere at(std::size_t i) const { return {x[i], y[i], z[i], r[i]}; }
+  void set(std::size_t i, const SweptSphere& sphere) {
+    x[i] = sphere.x;
+    y[i] = sphere.y;
+    z[i] = sphere.z;
+    r[i] = sphere.r;
+  }
+
+  std::size_t bytes() const { return 4 * x.capacity() * sizeof(float); }
+};
+
+/// Neighbouring lanes, and how far the image of them that is meant lies from them.
+struct LaneRun {
+  std::uint32_t begin, end;
+  float sx, sy, sz;
+};
+
+struct LaneHit {
+  std::uint32_t lane;
+  std::uint32_t run;  ///< index of the run it was found in
+};
+
+/// Finds the lanes that overlap a sphere.
+/// @param hits  room for all lanes of all runs
+/// @return number of hits
+std::size_t findOverlaps(const SweptLanes& lanes, const SweptSphere& sphere, const LaneRun* runs,
+                         std::size_t count, LaneHit* hits);
+
+}  // namespace ball_sim::core

@@ -1,0 +1,240 @@
+// Method continuous: no bit depends on frames or threads, no impact is missed, nothing is allocated
+// once it runs. That its impacts are the right ones is for the tests of all exact methods.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstdlib>
+#include <new>
+
+#include "ball_sim/fill.hpp"
+#include "ball_sim/observables.hpp"
+#include "support/random_scenes.hpp"
+#include "support/trial.hpp"
+
+namespace {
+std::atomic<std::size_t> allocations{0};
+}  // namespace
+
+// Counts what all of this program allocates by new; the vectors that are aligned for huge pages
+// call aligned_alloc, and are watched by their bytes.
+void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* memory = std::malloc(size == 0 ? 1 : size)) return memory;
+  throw std::bad_alloc();
+}
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
+  ++allocations;
+  return std::malloc(size == 0 ? 1 : size);
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+
+namespace ball_sim::core {
+namespace test {
+namespace {
+
+constexpr const char* kMethod = "continuous";
+
+MethodSettings withThreads(unsigned threads) {
+  MethodSettings settings;
+  settings.threads = threads;
+  return settings;
+}
+
+/// A closed box of equal balls at packing fraction 0.1.
+TestScene gas(std::size_t count, double largest_radius = 0.05) {
+  Scene scene;
+  Fill fill;
+  fill.count = count;
+  fill.radius = {0.05, largest_radius};
+  fill.mass = Range{1, 1};
+  fill.speed_sigma = 1;
+  fill.seed = 3;
+  fill.packing_fraction = 0.1;
+  scene.fill = {fill};
+  TestScene result;
+  result.balls = populate(scene);
+  result.surroundings = scene.surroundings;
+  return result;
+}
+
+std::uint64_t hashOf(const Trial& run) { return stateHash(run.states()); }
+
+void expectSameCollisions(const Trial& a, const Trial& b) {
+  ASSERT_EQ(a.collisions().size(), b.collisions().size());
+  for (std::size_t i = 0; i < a.collisions().size(); ++i) {
+    const Collision& one = a.collisions()[i];
+    const Collision& other = b.collisions()[i];
+    ASSERT_EQ(one.time, other.time) << i;
+    ASSERT_EQ(one.a, other.a) << i;
+    ASSERT_EQ(one.b, other.b) << i;
+    ASSERT_EQ(one.normal, other.normal) << i;
+    ASSERT_EQ(one.impulse, other.impulse) << i;
+  }
+}
+
+TEST(Continuous, sameBitsForAnyNumberOfThreads) {
+  const TestScene scene = gas(4000);  // enough for the threads to be woken
+  Trial alone(kMethod, scene, withThreads(1));
+  alone.advanceTo(0.5);
+  ASSERT_GT(alone.collisions().size(), 10000u);
+  for (const unsigned threads : {2u, 3u}) {
+    Trial together(kMethod, scene, withThreads(threads));
+    together.advanceTo(0.5);
+    EXPECT_EQ(hashOf(together), hashOf(alone)) << threads;
+    EXPECT_EQ(together.method().statistics().virial, alone.method().statistics().virial);
+    expectSameCollisions(together, alone);
+  }
+}
+
+// Of every kind of scene: steps of any length, and stops at any number of impacts.
+TEST(Continuous, sameBitsForAnyFrames) {
+  for (const SceneKind& kind : sceneKinds()) {
+    SCOPED_TRACE(kind.name);
+    const TestScene scene = randomScene(kind, 5);
+    const double end = kind.simulated_time;
+    Trial whole(kMethod, scene);
+    const bool reached = whole.method().advanceTo(Time::fromSeconds(end), 20000);
+    if (!reached) continue;  // a ball hums on another
+    RandomNumbers random(7);
+    for (const double frame : {1.0 / 60, 1.0 / 7, 1e-4, 0.0}) {
+      Trial stepped(kMethod, scene);
+      for (double t = 0; t < end;) {
+        t = std::min(end, t + (frame > 0 ? frame * end : random.uniform(0, 0.1) * end));
+        while (!stepped.method().advanceTo(Time::fromSeconds(t), random.index(5))) {
+        }
+      }
+      EXPECT_EQ(hashOf(stepped), hashOf(whole)) << frame;
+      expectSameCollisions(stepped, whole);
+      if (HasFailure()) return;
+    }
+  }
+}
+
+// A ball that is taken out ends the frame at that instant, and nothing else if nobody could have
+// met it: here specks in a corner that no ball fits into. So frames begin anywhere, and slots
+// change.
+TEST(Continuous, sameBitsWhereverFramesBegin) {
+  int kinds = 0;
+  for (const SceneKind& kind : sceneKinds()) {
+    if (kind.boundary != Boundary::closed || kind.offset > 0) continue;
+    SCOPED_TRACE(kind.name);
+    TestScene scene = randomScene(kind, 6);
+    const auto first_speck = static_cast<BallId>(scene.balls.size());
+    constexpr int kSpecks = 40;
+    for (int i = 0; i < kSpecks; ++i) {
+      Vector3 place = Vector3::Constant(1e-7 * (i + 1));
+      if (kind.planar) place.z() = 0;
+      scene.balls.push_back({place, Vector3::Zero(), 1e-8, kFixed});
+    }
+    Trial whole(kMethod, scene);
+    if (!whole.method().advanceTo(Time::fromSeconds(kind.simulated_time), 20000)) continue;
+    Trial broken(kMethod, scene);
+    RandomNumbers random(8);
+    double t = 0;
+    for (int i = 0; i < kSpecks; ++i) {
+      t += random.uniform(0, 2.0 / kSpecks) * (kind.simulated_time - t) / 2;
+      broken.advanceTo(t);
+      broken.method().remove(first_speck + static_cast<BallId>(i));
+    }
+    broken.advanceTo(kind.simulated_time);
+    for (BallId id = 0; id < first_speck; ++id) {
+      ASSERT_EQ(broken.position(id), whole.position(id)) << id;
+      ASSERT_EQ(broken.velocity(id), whole.velocity(id)) << id;
+    }
+    expectSameCollisions(broken, whole);
+    if (HasFailure()) return;
+    ++kinds;
+  }
+  EXPECT_GT(kinds, 10);
+}
+
+// Inside one long frame and in many: the fold of a straight line, in closed form.
+TEST(Continuous, aFastBulletLosesNeitherTimeNorSpeed) {
+  const double radius = 0.01;
+  const double speed = 60;  // 100 radii in 1/60 s
+  TestScene scene;
+  scene.surroundings.box.min = Vector3::Zero();
+  scene.surroundings.box.max = Vector3::Constant(1);
+  const Vector3 start(0.3, 0.4, 0.6);
+  const Vector3 velocity = speed * Vector3(2, 3, 6) / 7;
+  scene.balls = {{start, velocity, radius, 1}};
+  for (const double frame : {1.0 / 60, 1.0, 100.0}) {
+    Trial run(kMethod, scene);
+    for (int k = 1; k * frame <= 100; ++k) run.advanceTo(k * frame);
+    run.advanceTo(100);
+    for (int axis = 0; axis < 3; ++axis) {
+      const long double room = 1 - 2 * static_cast<long double>(radius);
+      const long double way = start[axis] - static_cast<long double>(radius) +
+                              100 * static_cast<long double>(velocity[axis]);
+      long double fold = std::fmod(way, 2 * room);
+      if (fold > room) fold = 2 * room - fold;
+      EXPECT_NEAR(run.position(0)[axis], double(fold + static_cast<long double>(radius)), 1e-10);
+    }
+    // Impacts with walls turn signs: not a bit of the speed is lost.
+    EXPECT_NEAR(run.velocity(0).norm() / speed, 1, 1e-14);
+  }
+}
+
+// Reference case 1: what a method that looks for overlap at the end of a frame misses.
+TEST(Continuous, missesNoneOfTheChordsThatStepsMiss) {
+  RandomNumbers random(9);
+  const double radius = 0.5;
+  int hits = 0;
+  for (int i = 0; i < 3000; ++i) {
+    TestScene scene;
+    const double offset = random.uniform(0, 1.2);  // of the sum of radii, 1 m
+    const double frame = 0.2;                      // m of way at 1 m/s: a chord may be shorter
+    scene.balls = {{Vector3(-2 + random.uniform(0, frame), offset, 0), Vector3(1, 0, 0), radius, 1},
+                   {Vector3::Zero(), Vector3::Zero(), radius, 1}};
+    Trial run(kMethod, scene);
+    for (double t = frame; t < 4; t += frame) run.advanceTo(t);
+    ASSERT_EQ(run.collisions().size(), offset < 1 ? 1u : 0u) << offset;
+    hits += offset < 1 ? 1 : 0;
+  }
+  EXPECT_GT(hits, 2000);
+}
+
+TEST(Continuous, allocatesNothingOnceRunning) {
+  for (const unsigned threads : {1u, 2u}) {
+    const TestScene scene = gas(3000);
+    Trial run(kMethod, scene, withThreads(threads));
+    run.method().setCollisionLog(nullptr);
+    run.advanceTo(3);
+    BallStates states = run.states();
+    const std::size_t bytes = run.method().statistics().bytes;
+    const std::size_t before = allocations;
+    for (double t = 3; t < 4; t += 1.0 / 60) {
+      run.method().advanceTo(Time::fromSeconds(t));
+      run.method().read(states);
+    }
+    EXPECT_EQ(allocations, before) << threads;
+    EXPECT_EQ(run.method().statistics().bytes, bytes);
+  }
+}
+
+TEST(Continuous, keepsToAQuarterOfAKilobyteABall) {
+  Trial run(kMethod, gas(20000));
+  run.log().capacity = 0;
+  run.advanceTo(0.2);
+  EXPECT_LE(double(run.method().statistics().bytes) / 20000, 250);
+}
+
+// A ball that is hit may become faster than any in the frame: the frame is then cut short.
+TEST(Continuous, aSlowCrowdIsHitByABullet) {
+  TestScene scene = gas(200, 0.2);
+  for (Ball& ball : scene.balls) ball.velocity *= 1e-3;
+  scene.balls[7].velocity = Vector3(100, 30, -20);
+  Trial whole(kMethod, scene);
+  whole.advanceTo(0.5);
+  ASSERT_GT(whole.collisions().size(), 500u);
+  EXPECT_LT(whole.method().statistics().deepest_overlap, 1e-13);
+  EXPECT_NEAR(double(kineticEnergyOf(scene, whole.states()) /
+                     kineticEnergyOf(scene, Trial(kMethod, scene).states())),
+              1, 1e-13);  // some thousand roundings of 1e-16
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace ball_sim::core
