@@ -39,7 +39,7 @@ VectorOf<Real> contactNormal(const VectorOf<Real>& dx) {
 template <class Real>
 Real roundingAlong(const VectorOf<Real>& v, const VectorOf<Real>& normal) {
   using std::abs;
-  constexpr Real kUlps = 16;
+  constexpr int kUlps = 16;
   return kUlps * std::numeric_limits<Real>::epsilon() *
          (abs(v[0] * normal[0]) + abs(v[1] * normal[1]) + abs(v[2] * normal[2]));
 }

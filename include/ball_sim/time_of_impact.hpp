@@ -17,7 +17,7 @@ namespace ball_sim::core {
 
 /// "Never", as a time.
 template <class Real>
-constexpr Real kNever = std::numeric_limits<Real>::infinity();
+inline const Real kNever = std::numeric_limits<Real>::infinity();
 
 /// Time until two balls in straight relative motion touch. Uniform gravity on both cancels.
 /// @param dx     centre of b minus centre of a, m

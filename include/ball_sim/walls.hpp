@@ -119,15 +119,15 @@ VectorOf<Real> velocityAlong(const VectorOf<Real>& v, const std::vector<Wall<Rea
   const auto normal = [&](int i) {
     return walls[static_cast<std::size_t>(contacts.walls[i])].normal;
   };
-  constexpr Real kParallel = Real(1e-9);  // of two unit vectors: nearer than any real wedge
+  const Real parallel = Real(1e-9);  // of two unit vectors: nearer than any real wedge
   if (contacts.count == 0) return v;
   for (int i = 1; i < contacts.count; ++i) {
     const VectorOf<Real> edge = normal(0).cross(normal(i));
     const Real squared = dot(edge, edge);
-    if (!(squared > kParallel * kParallel)) continue;
+    if (!(squared > parallel * parallel)) continue;
     for (int j = i + 1; j < contacts.count; ++j) {
       const Real out_of_edge = dot(edge, normal(j));
-      if (out_of_edge * out_of_edge > kParallel * kParallel) return VectorOf<Real>::Zero();
+      if (out_of_edge * out_of_edge > parallel * parallel) return VectorOf<Real>::Zero();
     }
     return (dot(v, edge) / squared) * edge;
   }

@@ -103,7 +103,7 @@ class World {
   MethodChoice method() const { return {method_->name(), method_->reason()}; }
   Statistics statistics() const { return method_->statistics(); }
   std::string warning() const { return method_->warning(); }  ///< see Method::warning()
-  double kineticEnergy() const;    ///< J
+  double kineticEnergy() const;                               ///< J
   double potentialEnergy() const;  ///< J, of gravity and of soft contacts
   Vector3 momentum() const;        ///< kg m/s
 

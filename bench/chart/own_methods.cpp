@@ -1,0 +1,91 @@
+// Our methods on the chart. event_driven and brute_force have no time step; every other method is
+// swept over it.
+#include "ball_sim/methods.hpp"
+#include "entrant.hpp"
+
+namespace ball_sim::core::chart {
+namespace {
+
+// More would be a stalled clock.
+constexpr std::uint64_t kMostEvents = 2'000'000'000;
+
+class OwnSimulation final : public Simulation {
+ public:
+  OwnSimulation(const std::string& method, bool in_frames, const Surroundings& surroundings,
+                const std::vector<Ball>& balls, double step)
+      : method_(makeMethod(method, surroundings, settingsOf(step))),
+        step_(step),
+        in_frames_(in_frames) {
+    for (std::size_t i = 0; i < balls.size(); ++i) {
+      method_->insert(static_cast<BallId>(i), balls[i]);
+    }
+  }
+
+  // A frame of `continuous` is one call; event_driven and brute_force go all the way in one.
+  void advance(std::uint64_t steps) override {
+    for (std::uint64_t i = 0; i < (in_frames_ ? steps : 1); ++i) {
+      steps_ += in_frames_ ? 1 : steps;
+      const Time target = Time::fromSeconds(static_cast<double>(steps_) * step_);
+      if (!method_->advanceTo(target, kMostEvents)) throw std::runtime_error("the clock stalls");
+    }
+  }
+
+  void read(BallStates& states) override { method_->read(states); }
+
+  // The log is taken up at the first call, so that a run that is timed carries none.
+  void takeImpacts(std::vector<Impact>& impacts) override {
+    method_->setCollisionLog(&log_);
+    for (const Collision& collision : log_.entries) {
+      impacts.push_back(impactOf(collision.a, collision.b));
+    }
+    log_.entries.clear();
+  }
+
+  Work work() const override {
+    const Statistics statistics = method_->statistics();
+    return {statistics.events, statistics.ball_collisions, statistics.virial,
+            statistics.deepest_overlap};
+  }
+
+ private:
+  static MethodSettings settingsOf(double step) {
+    MethodSettings settings;
+    settings.time_step = step;
+    return settings;
+  }
+
+  CollisionLog log_;  // outlives the method
+  std::unique_ptr<Method> method_;
+  double step_;  // s
+  bool in_frames_;
+  std::uint64_t steps_ = 0;  // so far
+};
+
+// All pairs: from a thousand balls on it would take minutes.
+std::string refusalOfBruteForce(const PreparedScene& scene) {
+  return scene.balls.size() > 200 ? "all pairs, at every event: too slow for so many balls" : "";
+}
+
+}  // namespace
+
+std::vector<Entrant> ownMethods() {
+  std::vector<Entrant> entrants;
+  for (const std::string& name : methodNames()) {
+    if (name == "auto") continue;
+    Entrant entrant;
+    entrant.name = name;
+    const bool exact = name == "event_driven" || name == "brute_force";
+    entrant.kind = exact ? Kind::exact : Kind::stepped;
+    entrant.cost = 150;
+    entrant.refusal = [](const PreparedScene&) { return std::string(); };
+    if (name == "brute_force") entrant.refusal = refusalOfBruteForce;
+    entrant.make = [name, exact](const Surroundings& surroundings, const std::vector<Ball>& balls,
+                                 double step) {
+      return std::make_unique<OwnSimulation>(name, !exact, surroundings, balls, step);
+    };
+    entrants.push_back(entrant);
+  }
+  return entrants;
+}
+
+}  // namespace ball_sim::core::chart
