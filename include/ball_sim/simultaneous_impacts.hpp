@@ -46,7 +46,7 @@ namespace ball_sim::core {
 /// @param extent  m, magnitude of the coordinates that the gap was computed from, >= 0
 template <class Real>
 bool touches(Real gap, Real reach, Real extent) {
-  constexpr Real kUlps = 16;  // of the coordinates, of their last few roundings
+  constexpr int kUlps = 16;  // of the coordinates, of their last few roundings
   const Real rounding = kUlps * std::numeric_limits<Real>::epsilon() * extent;
   return gap <= Real(kTouchSlack) * reach + rounding;
 }
@@ -61,14 +61,14 @@ bool orderMatters(const VectorOf<Real>& n_a, const VectorOf<Real>& n_b, Real w, 
   using std::acos;
   using std::floor;
   using std::sqrt;
-  if (!(w > 0)) return false;              // a fixed ball hands nothing on
-  constexpr Real kTolerance = Real(1e-9);  // of theta: normals of balls that touch to 1e-12
+  if (!(w > 0)) return false;         // a fixed ball hands nothing on
+  const Real tolerance = Real(1e-9);  // of theta: normals of balls that touch to 1e-12
   const Real cosine = -dot(n_a, n_b) * (w / sqrt((w + w_a) * (w + w_b)));
-  if (abs(cosine) <= kTolerance) return false;
+  if (abs(cosine) <= tolerance) return false;
   if (restitution < 1) return true;
   if (!(cosine < 1)) return false;
   const Real k = Real(3.14159265358979323846L) / acos(std::max(cosine, Real(-1)));
-  return abs(k - floor(k + Real(0.5))) > kTolerance * k * k;
+  return abs(k - floor(k + Real(0.5))) > tolerance * k * k;
 }
 
 /// A ball of a cluster.
@@ -104,7 +104,7 @@ template <class Real>
 void keepApproaching(const std::vector<ClusterBody<Real>>& bodies,
                      std::vector<ClusterContact<Real>>& contacts) {
   using std::sqrt;
-  constexpr Real kUlps = 64;  // of the cluster's fastest ball
+  constexpr int kUlps = 64;  // of the cluster's fastest ball
   Real fastest = 0;
   for (const ClusterBody<Real>& body : bodies) fastest = std::max(fastest, dot(body.v, body.v));
   const Real rounding = kUlps * std::numeric_limits<Real>::epsilon() * sqrt(fastest);
@@ -195,9 +195,9 @@ class NonNegativeSystem {
   }
 
  private:
-  static constexpr Real kUnresolved = Real(1e-13);  // of the fastest approach: the next round's
-  static constexpr Real kIndependent = Real(1e-8);  // sine of a column to those before it
-  static constexpr Real kDependent = 1000 * std::numeric_limits<Real>::epsilon();
+  static inline const Real kUnresolved = Real(1e-13);  // of the fastest approach: the next round's
+  static inline const Real kIndependent = Real(1e-8);  // sine of a column to those before it
+  static inline const Real kDependent = 1000 * std::numeric_limits<Real>::epsilon();
 
   static Real product(const Numbers& a, const Numbers& b) {
     Real sum = 0;
