@@ -16,7 +16,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <cstring>
 #include <limits>
 #include <vector>
@@ -401,12 +400,11 @@ class CellGrid {
     return {c[0] >> shift, c[1] >> shift, c[2] >> shift};
   }
 
-  /// Cells between two coordinates along one axis, of cells whose edges are halved `depth` times;
-  /// the short way round where the axis is periodic.
-  std::int32_t cellsBetween(std::size_t axis, std::int32_t a, std::int32_t b, int depth) const {
-    const std::int32_t cells = std::abs(a - b);
-    if (!axes_[axis].periodic) return cells;
-    return std::min(cells, static_cast<std::int32_t>(axes_[axis].cells << depth) - cells);
+  /// Cells once round a periodic axis, of cells whose edges are halved `depth` times; on others so
+  /// many that the way round is never the shorter.
+  std::int32_t pointsRound(std::size_t axis, int depth) const {
+    if (!axes_[axis].periodic) return std::numeric_limits<std::int32_t>::max();
+    return static_cast<std::int32_t>(axes_[axis].cells << depth);
   }
 
   void resize(std::size_t slots) {

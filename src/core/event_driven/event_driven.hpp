@@ -23,6 +23,7 @@
 #include <cassert>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <optional>
 #include <stdexcept>
 #include <vector>
@@ -412,6 +413,7 @@ class EventDriven final : public Method {
       for (std::size_t k = 0; k < 3; ++k) {
         region_width_[k] = static_cast<std::int32_t>(2 * half / regions_.spacing[k]);
         regions_.half[k] = Real(region_width_[k]) * regions_.spacing[k] / 2;
+        region_round_[k] = grid_.pointsRound(k, NeighbourLists::kLatticeDepth);
       }
       listed_ = nearestImagesSuffice(grid_);
     }
@@ -598,8 +600,8 @@ class EventDriven final : public Method {
       const CellCoordinates& there = lists_.home(other);
       Real squared = 0;
       for (std::size_t k = 0; k < 3; ++k) {
-        const std::int32_t apart =
-            grid_.cellsBetween(k, home[k], there[k], NeighbourLists::kLatticeDepth);
+        const std::int32_t straight = std::abs(home[k] - there[k]);
+        const std::int32_t apart = std::min(straight, region_round_[k] - straight);
         const Real gap = Real(std::max(apart - region_width_[k], 0)) * regions_.spacing[k];
         squared += gap * gap;
       }
@@ -1213,6 +1215,7 @@ class EventDriven final : public Method {
   bool listed_ = false;           // who is near is told by lists_, else by grid_ alone
   Lattice<Real> regions_;         // of the lists
   CellCoordinates region_width_;  // in points of their lattice
+  CellCoordinates region_round_;  // such points once round a periodic box
   Real list_reach_ = 0;           // m, largest sum of radii that the lists allow for
   std::size_t list_capacity_ = 11;
   Real coarsest_edge_ = 0;  // m, the shortest edge of a cell of the coarsest level

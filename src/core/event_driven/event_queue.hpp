@@ -11,6 +11,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cstdint>
 #include <limits>
@@ -82,7 +83,7 @@ class EventQueue {
   std::uint32_t buckets() const { return buckets_; }
   std::size_t bytes() const {
     return heads_.capacity() * sizeof(Slot) +
-           (bucket_.capacity() + sorted_.capacity() + late_.capacity()) * sizeof(Entry);
+           (sorted_.capacity() + late_.capacity()) * sizeof(Entry);
   }
 
   /// Adds a ball that is not queued. Its due() must not change while it is, and not be before the
@@ -183,6 +184,7 @@ class EventQueue {
 
  private:
   static constexpr std::uint32_t kFarAhead = 4;
+  static constexpr std::size_t kSmall = 32;  // entries of a bucket
   // Up to so many balls all is in the cache anyway, and to fetch ahead would only cost.
   static constexpr std::size_t kCachedBalls = 20000;
 
@@ -262,37 +264,37 @@ class EventQueue {
 
   template <class Order>
   void openBucket(Order order) {
-    bucket_.clear();
+    sorted_.clear();
     for (Slot slot = heads_[current_]; slot != kNoSlot; slot = agendas_[slot].next) {
       agendas_[slot].previous = kAtHand;
-      bucket_.push_back({agendas_[slot].due(), order(slot), slot});
+      sorted_.push_back({agendas_[slot].due(), order(slot), slot});
     }
     heads_[current_] = kNoSlot;
-    sortBucket();
     position_ = 0;
+    if (sorted_.size() > kSmall || !sortByCounting()) std::sort(sorted_.begin(), sorted_.end());
   }
 
   // A small bucket is sorted by counting for each entry how many come before it: there is no branch
   // in this to be foretold wrongly.
-  void sortBucket() {
-    constexpr std::size_t kSmall = 24;
-    const std::size_t count = bucket_.size();
-    sorted_.resize(count);
-    if (count > kSmall) {
-      std::copy(bucket_.begin(), bucket_.end(), sorted_.begin());
-      std::sort(sorted_.begin(), sorted_.end());
-      return;
+  // @return false, and nothing sorted, when two are due at one instant
+  bool sortByCounting() {
+    const std::size_t count = sorted_.size();
+    std::array<Real, kSmall> due;
+    std::array<Entry, kSmall> unsorted;
+    for (std::size_t i = 0; i < count; ++i) {
+      unsorted[i] = sorted_[i];
+      due[i] = sorted_[i].due;
     }
-    for (const Entry& entry : bucket_) {
+    std::size_t pairs = 0;  // in order; all of them, unless some are due together
+    for (std::size_t i = 0; i < count; ++i) {
       std::size_t before = 0;
-      for (const Entry& other : bucket_) {
-        const bool same_but_first = (other.due == entry.due) & (other.order < entry.order);
-        const bool same_but_lower = other.ties(entry) & (other.slot < entry.slot);
-        before +=
-            static_cast<std::size_t>((other.due < entry.due) | same_but_first | same_but_lower);
-      }
-      sorted_[before] = entry;
+      for (std::size_t j = 0; j < count; ++j) before += due[j] < due[i] ? 1 : 0;
+      sorted_[before] = unsorted[i];
+      pairs += before;
     }
+    if (2 * pairs == count * (count - 1)) return true;
+    std::copy_n(unsorted.begin(), count, sorted_.begin());
+    return false;
   }
 
   template <class Expect>
@@ -324,7 +326,6 @@ class EventQueue {
   Slot beyond_ = kNoSlot;       // head of the list of events beyond the year
   std::uint32_t buckets_ = 0;
   std::uint32_t current_ = 0;
-  std::vector<Entry> bucket_;  // scratch: as it was found
   std::vector<Entry> sorted_;  // the bucket at hand
   std::size_t position_ = 0;   // of the next in sorted_
   std::vector<Entry> late_;    // heap of those that came late into the bucket at hand
