@@ -83,7 +83,7 @@ class EventQueue {
   std::uint32_t buckets() const { return buckets_; }
   std::size_t bytes() const {
     return heads_.capacity() * sizeof(Slot) +
-           (sorted_.capacity() + late_.capacity()) * sizeof(Entry);
+           (sorted_.capacity() + late_.capacity() + tied_.capacity()) * sizeof(Entry);
   }
 
   /// Adds a ball that is not queued. Its due() must not change while it is, and not be before the
@@ -244,17 +244,17 @@ class EventQueue {
   // Of the live entries that tie with `first`, the one to go first; the others stay.
   template <class Order, class Later>
   Entry leastOfTies(const Entry& first, Order order, Later later) {
-    std::vector<Entry> tied = {first};
+    tied_.assign(1, first);
     while (isTied(first)) {
-      if (isLive(firstAtHand(), order)) tied.push_back(firstAtHand());
+      if (isLive(firstAtHand(), order)) tied_.push_back(firstAtHand());
       skip();
     }
     const auto least =
-        std::min_element(tied.begin(), tied.end(), [&](const Entry& a, const Entry& b) {
+        std::min_element(tied_.begin(), tied_.end(), [&](const Entry& a, const Entry& b) {
           return later(a.slot) != later(b.slot) ? later(a.slot) < later(b.slot) : a.slot < b.slot;
         });
     const Entry found = *least;
-    for (const Entry& entry : tied) {
+    for (const Entry& entry : tied_) {
       if (entry.slot == found.slot) continue;
       late_.push_back(entry);
       std::push_heap(late_.begin(), late_.end(), isLater);
@@ -329,6 +329,7 @@ class EventQueue {
   std::vector<Entry> sorted_;  // the bucket at hand
   std::size_t position_ = 0;   // of the next in sorted_
   std::vector<Entry> late_;    // heap of those that came late into the bucket at hand
+  std::vector<Entry> tied_;    // scratch of leastOfTies()
   std::size_t in_year_ = 0;    // events queued that are not beyond the year
 };
 

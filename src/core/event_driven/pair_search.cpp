@@ -221,19 +221,30 @@ struct Lanes {
 #endif
 
 template <>
-PairSearch<double> choosePairSearch<double>(bool wraps, bool falls) {
+std::vector<PairSearch<double>> pairSearches<double>(bool wraps, bool falls) {
+  std::vector<PairSearch<double>> searches;
 #ifdef BALL_SIM_X86_LANES
-  if (__builtin_cpu_supports("avx512f")) return eight_lanes::pairSearch(wraps, falls);
-  if (__builtin_cpu_supports("avx2")) return four_lanes::pairSearch(wraps, falls);
-  return two_lanes::pairSearch(wraps, falls);
-#else
-  return one_lane::of_double::pairSearch(wraps, falls);
+  if (__builtin_cpu_supports("avx512f")) {
+    searches.push_back(eight_lanes::pairSearch(wraps, falls));
+  }
+  if (__builtin_cpu_supports("avx2")) searches.push_back(four_lanes::pairSearch(wraps, falls));
+  searches.push_back(two_lanes::pairSearch(wraps, falls));
 #endif
+  searches.push_back(one_lane::of_double::pairSearch(wraps, falls));
+  return searches;
 }
 
 template <>
-PairSearch<long double> choosePairSearch<long double>(bool wraps, bool falls) {
-  return one_lane::of_long_double::pairSearch(wraps, falls);
+std::vector<PairSearch<long double>> pairSearches<long double>(bool wraps, bool falls) {
+  return {one_lane::of_long_double::pairSearch(wraps, falls)};
 }
+
+template <class Real>
+PairSearch<Real> choosePairSearch(bool wraps, bool falls) {
+  return pairSearches<Real>(wraps, falls).front();
+}
+
+template PairSearch<double> choosePairSearch<double>(bool wraps, bool falls);
+template PairSearch<long double> choosePairSearch<long double>(bool wraps, bool falls);
 
 }  // namespace ball_sim::core

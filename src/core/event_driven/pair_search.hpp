@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <vector>
 
 #include "ball_sim/time_of_impact.hpp"
 #include "ball_sim/vector.hpp"
@@ -79,5 +80,9 @@ using PairSearch = PairHit<Real> (*)(const Body<Real>* bodies, const Slot* slots
 /// @param falls  the balls fall by space.fall; without it no fall is computed
 template <class Real>
 PairSearch<Real> choosePairSearch(bool wraps, bool falls);
+
+/// The same search in every kind of instructions that this processor has, the widest first.
+template <class Real>
+std::vector<PairSearch<Real>> pairSearches(bool wraps, bool falls);
 
 }  // namespace ball_sim::core

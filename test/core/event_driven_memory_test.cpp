@@ -1,0 +1,84 @@
+// Method event_driven: no allocation once running, and how much memory a ball takes.
+#include <gtest/gtest.h>
+
+#include "ball_sim/fill.hpp"
+#include "support/allocation_counter.hpp"
+#include "support/trial.hpp"
+
+namespace ball_sim::core {
+namespace test {
+namespace {
+
+constexpr std::size_t kBalls = 1000;
+
+/// Equal balls in a periodic box.
+TestScene fluid(double packing_fraction) {
+  Scene scene;
+  Fill fill;
+  fill.count = kBalls;
+  fill.radius = {0.5, 0.5};
+  fill.mass = Range{1, 1};
+  fill.speed_sigma = 1;
+  fill.seed = 1;
+  fill.packing_fraction = packing_fraction;
+  scene.surroundings.periodic = true;
+  scene.fill = {fill};
+  TestScene result;
+  result.balls = populate(scene);
+  result.surroundings = scene.surroundings;
+  return result;
+}
+
+/// Balls that fall and bounce in a closed box.
+TestScene falling() {
+  TestScene scene = fluid(0.05);
+  Surroundings& around = scene.surroundings;
+  around.periodic = false;
+  around.box.min -= Vector3::Constant(0.5);  // no ball reaches out of it
+  around.box.max += Vector3::Constant(0.5);
+  around.gravity = Vector3(0, 0, -0.05);
+  return scene;
+}
+
+void expectNoAllocation(const TestScene& scene, double warm_up, double end) {
+  Trial run("event_driven", scene);
+  run.log().capacity = 0;
+  run.advanceTo(warm_up);  // long enough for every list to have been at its longest
+  BallStates states = run.states();
+  const Statistics before = run.method().statistics();
+  const long allocated = allocations;
+  run.advanceTo(end);
+  run.method().read(states);
+  EXPECT_EQ(allocations - allocated, 0);
+  const Statistics after = run.method().statistics();
+  EXPECT_EQ(after.bytes, before.bytes);
+  EXPECT_GT(after.ball_collisions, before.ball_collisions + 10 * kBalls);
+}
+
+TEST(EventDrivenMemory, NothingIsAllocatedOnceDiluteBallsFly) {
+  expectNoAllocation(fluid(0.05), 100, 150);
+}
+
+TEST(EventDrivenMemory, NothingIsAllocatedOnceDenseBallsFly) {
+  expectNoAllocation(fluid(0.49), 10, 15);
+}
+
+TEST(EventDrivenMemory, NothingIsAllocatedOnceBallsFall) {
+  expectNoAllocation(falling(), 100, 150);
+}
+
+TEST(EventDrivenMemory, ABallTakesAQuarterOfAKilobyte) {
+  for (const double packing_fraction : {0.05, 0.2, 0.49}) {
+    Trial run("event_driven", fluid(packing_fraction));
+    run.log().capacity = 0;
+    run.advanceTo(10);
+    const double bytes = double(run.method().statistics().bytes) / double(kBalls);
+    EXPECT_LE(bytes, 250) << "packing fraction " << packing_fraction;
+    EXPECT_GE(bytes, 2 * 64) << "two cache lines are each ball's own";
+    RecordProperty("bytes_per_ball", std::to_string(bytes));
+  }
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace ball_sim::core

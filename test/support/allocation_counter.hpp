@@ -1,0 +1,59 @@
+// Counts what a test program allocates by new, so that a test can tell that nothing is.
+//
+// Replaces the global operators of the whole program: include it in one source file only. The
+// vectors aligned for huge pages (huge_page_vector.hpp) call aligned_alloc and are not counted:
+// Statistics::bytes watches them.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdlib>
+#include <new>
+
+namespace ball_sim::core {
+namespace test {
+
+/// Calls of new since the program began, on all threads.
+inline std::atomic<long> allocations{0};
+
+namespace detail {
+
+inline void* allocate(std::size_t size) noexcept {
+  ++allocations;
+  return std::malloc(size == 0 ? 1 : size);
+}
+
+inline void* allocate(std::size_t size, std::align_val_t alignment) noexcept {
+  ++allocations;
+  const auto step = static_cast<std::size_t>(alignment);
+  return std::aligned_alloc(step, (size + step - 1) / step * step);
+}
+
+inline void* orThrow(void* memory) {
+  if (memory == nullptr) throw std::bad_alloc();
+  return memory;
+}
+
+}  // namespace detail
+}  // namespace test
+}  // namespace ball_sim::core
+
+// GCC takes free() in these for a mistake where it has inlined one of the pair but not the other.
+#if defined(__GNUC__) && __GNUC__ >= 11 && !defined(__clang__)
+#pragma GCC diagnostic ignored "-Wmismatched-new-delete"
+#endif
+
+void* operator new(std::size_t size) {
+  return ball_sim::core::test::detail::orThrow(ball_sim::core::test::detail::allocate(size));
+}
+void* operator new(std::size_t size, std::align_val_t alignment) {
+  return ball_sim::core::test::detail::orThrow(
+      ball_sim::core::test::detail::allocate(size, alignment));
+}
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
+  return ball_sim::core::test::detail::allocate(size);
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
