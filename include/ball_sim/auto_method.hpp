@@ -69,7 +69,7 @@ class AutoMethod final : public Method {
     double energy = 0;          // J, kinetic and of gravity
   };
 
-  std::uint64_t eventsToLook() const;
+  std::uint64_t eventsToLook(std::uint64_t counted) const;
   void outsideChange();
   void startWindow();
   Look look();

@@ -106,23 +106,25 @@ void AutoMethod::startWindow() {
   window_collisions_ = counted.ball_collisions;
 }
 
-std::uint64_t AutoMethod::eventsToLook() const {
+std::uint64_t AutoMethod::eventsToLook(std::uint64_t counted) const {
   const std::uint64_t length =
       kEventsPerBallAndLook * balls_.size() + (stepping_ ? 1 : kFewestImpacts);
-  const std::uint64_t passed = method_->statistics().events - window_events_;
+  const std::uint64_t passed = counted - window_events_;
   return passed < length ? length - passed : 0;
 }
 
 bool AutoMethod::advanceTo(Time target, std::uint64_t max_events) {
   if (numbers_.balls == 0 && movable_ > 0) survey();
+  std::uint64_t counted = method_->statistics().events;
   while (true) {
-    const std::uint64_t before = method_->statistics().events;
-    const bool reached = method_->advanceTo(target, std::min(max_events, eventsToLook()));
-    const std::uint64_t used = method_->statistics().events - before;
-    max_events -= std::min(max_events, used);
-    if (eventsToLook() == 0) {
+    const std::uint64_t before = counted;
+    const bool reached = method_->advanceTo(target, std::min(max_events, eventsToLook(before)));
+    counted = method_->statistics().events;
+    max_events -= std::min(max_events, counted - before);
+    if (eventsToLook(counted) == 0) {
       judge(look());
       startWindow();
+      counted = window_events_;
     }
     if (reached) return true;
     if (max_events == 0) return false;
