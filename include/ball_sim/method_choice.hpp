@@ -79,6 +79,9 @@ double horizonInCollisions(double bits_per_collision, double tolerance);
 /// The error that ends a trajectory's use where a scene names no tolerance, of a radius.
 constexpr double kVisibleError = 1e-2;
 
+/// The methods that `auto` may choose from: all, or those that can take impacts together.
+std::vector<std::string> methodsThatKeep(SimultaneousImpacts policy);
+
 SceneNumbers sceneNumbers(const Surroundings& surroundings, const std::vector<Ball>& balls);
 
 /// CPU time of a simulated second, s, by costs measured with bench/auto_benchmark on fluids of 10^3

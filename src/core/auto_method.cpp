@@ -27,8 +27,7 @@ constexpr int kDearWindows = 4;
 constexpr double kFirstStay = 10;    // falls by a radius, of stepping before the way back is open
 constexpr double kFarPerStep = 0.5;  // of the smallest radius: further, and impacts are missed
 
-bool isKnown(const std::string& name) {
-  const std::vector<std::string>& names = methodNames();
+bool isAmong(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
@@ -48,7 +47,8 @@ AutoMethod::AutoMethod(const Surroundings& surroundings, const MethodSettings& s
     : surroundings_(surroundings),
       settings_(settings),
       gravity_(std::sqrt(dot(surroundings.gravity, surroundings.gravity))),
-      can_pile_(gravity_ > 0 && surroundings.restitution < 1 && isKnown("discrete")),
+      choices_(methodsThatKeep(settings.simultaneous_impacts)),
+      can_pile_(gravity_ > 0 && surroundings.restitution < 1 && isAmong(choices_, "discrete")),
       exact_name_(first.name),
       exact_reason_(first.reason),
       method_(make(first.name)) {}
@@ -62,6 +62,19 @@ std::string AutoMethod::reason() const {
         "stay right";
   }
   return text;
+}
+
+// An exact method overlaps balls by rounding, or by what a stepping one left it.
+std::string AutoMethod::warning() const {
+  const std::string own = method_->warning();
+  const double overlap = method_->statistics().deepest_overlap;
+  const double limit = settings_.tolerance.value_or(kVisibleError) * numbers_.smallest_radius;
+  if (stepping_ || !(overlap > std::max(limit, before_.deepest_overlap))) return own;
+  const std::string deep = "balls overlapped by " + formatShort(overlap) + " m at an impact, and " +
+                           formatShort(limit) +
+                           " m is the tolerance: places are wrong by as much; see that none is put "
+                           "into another";
+  return own.empty() ? deep : own + "; " + deep;
 }
 
 void AutoMethod::insert(BallId id, const Ball& ball) {
@@ -239,7 +252,7 @@ void AutoMethod::considerCheaper(const Look& look) {
   SceneNumbers now_numbers = numbers_;
   now_numbers.collision_rate = look.collision_rate;
   now_numbers.mean_speed = look.mean_speed;
-  const MethodChoice best = chooseFor(now_numbers, settings_.tolerance, methodNames());
+  const MethodChoice best = chooseFor(now_numbers, settings_.tolerance, choices_);
   const std::optional<double> cost = estimatedCost(method_->name(), now_numbers);
   const std::optional<double> best_cost = estimatedCost(best.name, now_numbers);
   const bool dear = cost && best_cost && *cost > kMuchCheaper * *best_cost;

@@ -340,10 +340,16 @@ std::optional<double> estimatedCost(const std::string& method, const SceneNumber
   return count * (of_move * moves + of_impact * numbers.collision_rate / 2);
 }
 
+std::vector<std::string> methodsThatKeep(SimultaneousImpacts policy) {
+  if (policy == SimultaneousImpacts::sequential) return methodNames();
+  return {"event_driven"};
+}
+
 MethodChoice chooseMethod(const std::string& name, const Scene& scene,
                           const std::vector<Ball>& balls) {
   if (name != "auto") return {name, "asked for"};
-  return chooseFor(sceneNumbers(scene.surroundings, balls), scene.tolerance, methodNames());
+  return chooseFor(sceneNumbers(scene.surroundings, balls), scene.tolerance,
+                   methodsThatKeep(scene.simultaneous_impacts));
 }
 
 MethodChoice chooseFor(const SceneNumbers& numbers, std::optional<double> tolerance,

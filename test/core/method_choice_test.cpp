@@ -288,6 +288,17 @@ TEST(Choice, countsTheCrowdAroundLargeBalls) {
   EXPECT_EQ(chooseFor(mixed, 1e-6, methodNames()).name, "continuous");
 }
 
+TEST(Choice, keepsToWhatTakesImpactsTogether) {
+  Scene scene;
+  scene.surroundings.periodic = true;
+  scene.surroundings.box.min = Vector3::Zero();
+  scene.surroundings.box.max = Vector3::Constant(400);  // a packing fraction of 0.0008
+  const std::vector<Ball> balls = unitFluid(100000, 3);
+  EXPECT_EQ(chooseMethod("auto", scene, balls).name, "continuous");
+  scene.simultaneous_impacts = SimultaneousImpacts::simultaneous;
+  EXPECT_EQ(chooseMethod("auto", scene, balls).name, "event_driven");
+}
+
 TEST(Choice, takesWhatIsThereAndExact) {
   SceneNumbers numbers;
   EXPECT_EQ(chooseFor(numbers, 0.5, kToday).name, "event_driven");
