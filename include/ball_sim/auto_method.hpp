@@ -11,7 +11,9 @@
 //   moves half its radius a step, or energy has appeared. Back to the exact method.
 // - Another exact method would cost much less at the rate of collisions that is counted.
 // A flood that comes back soon after a pile was stirred doubles the time before the next way back,
-// so that no scene makes it flutter. An exact method is left for a stepping one only in a flood.
+// so that no scene makes it flutter. An exact method is left for a stepping one only in a flood,
+// and never where impacts at one instant are to be taken together, which only event_driven can. An
+// exact method whose balls overlap by more than the tolerance makes warning() speak.
 //
 // Gets right: what the method at work does. Misses: a change over forgets which balls have just
 // met; energy that contacts of discrete held at rest in overlap comes free within its tolerance.
@@ -37,7 +39,7 @@ class AutoMethod final : public Method {
 
   const char* name() const override { return method_->name(); }
   std::string reason() const override;
-  std::string warning() const override { return method_->warning(); }
+  std::string warning() const override;
 
   void insert(BallId id, const Ball& ball) override;
   void remove(BallId id) override;
@@ -69,7 +71,7 @@ class AutoMethod final : public Method {
     double energy = 0;          // J, kinetic and of gravity
   };
 
-  std::uint64_t eventsToLook() const;
+  std::uint64_t eventsToLook(std::uint64_t counted) const;
   void outsideChange();
   void startWindow();
   Look look();
@@ -89,7 +91,8 @@ class AutoMethod final : public Method {
 
   Surroundings surroundings_;
   MethodSettings settings_;
-  double gravity_ = 0;  // m/s^2, magnitude
+  double gravity_ = 0;                // m/s^2, magnitude
+  std::vector<std::string> choices_;  // methods there are for this scene
   bool can_pile_ = false;
   std::string exact_name_;    // the exact method to go back to
   std::string exact_reason_;  // of the choice at the start

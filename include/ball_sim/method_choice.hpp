@@ -39,14 +39,18 @@ struct SceneNumbers {
   double collision_rate = 0;    ///< 1/s, ball-ball collisions of a ball; each counts for both
   double bits_per_collision = 0;  ///< by which errors grow while a ball has a collision, of the
                                   ///< size of balls whose errors grow fastest
+  double crowd = 0;  ///< balls in a cube (planar: square) as wide as a ball, mean over collisions:
+                     ///< large balls among small ones, for whose impacts many are searched
 
   /// Whether there is no fluid to speak of; and any method takes no time.
   bool areFew() const { return balls < 32; }
 };
 
-// Measured, s of CPU time: an event of event_driven, and a step of a ball in a pile of discrete.
-constexpr double kCostOfEvent = 0.5e-6;
-constexpr double kCostOfStep = 0.3e-6;
+// Measured by bench/auto_benchmark in piles of 300 balls when they have just formed, s of CPU time:
+// an event of event_driven, and a step of a ball of discrete. Both are a quarter of it in a stack
+// of 10.
+constexpr double kCostOfEvent = 2e-6;
+constexpr double kCostOfStep = 0.7e-6;
 
 /// Collision rate of a mixed fluid of hard balls by Enskog's theory, for any radii, masses and
 /// speeds: rate_ij = n_j chi_ij pi s_ij^2 g_ij for spheres, n_j chi_ij 2 s_ij g_ij for discs, s_ij
@@ -75,12 +79,16 @@ double horizonInCollisions(double bits_per_collision, double tolerance);
 /// The error that ends a trajectory's use where a scene names no tolerance, of a radius.
 constexpr double kVisibleError = 1e-2;
 
+/// The methods that `auto` may choose from: all, or those that can take impacts together.
+std::vector<std::string> methodsThatKeep(SimultaneousImpacts policy);
+
 SceneNumbers sceneNumbers(const Surroundings& surroundings, const std::vector<Ball>& balls);
 
 /// CPU time of a simulated second, s, by costs measured with bench/auto_benchmark on fluids of 10^3
 /// to 10^5 balls (Xeon with 2 MiB of L2 a core): an impact costs so much, and so does the way of a
-/// ball to where its neighbours were; both cost more where the balls do not fit into the cache.
-/// Within 20 % of what was measured for spheres, 50 % for discs.
+/// ball to where its neighbours were; both cost more where the balls do not fit into the cache. An
+/// impact of a large ball among small ones costs event_driven more, by the balls it has around it.
+/// Within 35 % of what was measured for spheres, a factor of 2 for discs.
 /// @param method  an exact method
 /// @return nothing for a method whose cost is not known
 std::optional<double> estimatedCost(const std::string& method, const SceneNumbers& numbers);

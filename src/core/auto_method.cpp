@@ -27,8 +27,7 @@ constexpr int kDearWindows = 4;
 constexpr double kFirstStay = 10;    // falls by a radius, of stepping before the way back is open
 constexpr double kFarPerStep = 0.5;  // of the smallest radius: further, and impacts are missed
 
-bool isKnown(const std::string& name) {
-  const std::vector<std::string>& names = methodNames();
+bool isAmong(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
@@ -48,7 +47,8 @@ AutoMethod::AutoMethod(const Surroundings& surroundings, const MethodSettings& s
     : surroundings_(surroundings),
       settings_(settings),
       gravity_(std::sqrt(dot(surroundings.gravity, surroundings.gravity))),
-      can_pile_(gravity_ > 0 && surroundings.restitution < 1 && isKnown("discrete")),
+      choices_(methodsThatKeep(settings.simultaneous_impacts)),
+      can_pile_(gravity_ > 0 && surroundings.restitution < 1 && isAmong(choices_, "discrete")),
       exact_name_(first.name),
       exact_reason_(first.reason),
       method_(make(first.name)) {}
@@ -62,6 +62,19 @@ std::string AutoMethod::reason() const {
         "stay right";
   }
   return text;
+}
+
+// An exact method overlaps balls by rounding, or by what a stepping one left it.
+std::string AutoMethod::warning() const {
+  const std::string own = method_->warning();
+  const double overlap = method_->statistics().deepest_overlap;
+  const double limit = settings_.tolerance.value_or(kVisibleError) * numbers_.smallest_radius;
+  if (stepping_ || !(overlap > std::max(limit, before_.deepest_overlap))) return own;
+  const std::string deep = "balls overlapped by " + formatShort(overlap) + " m at an impact, and " +
+                           formatShort(limit) +
+                           " m is the tolerance: places are wrong by as much; see that none is put "
+                           "into another";
+  return own.empty() ? deep : own + "; " + deep;
 }
 
 void AutoMethod::insert(BallId id, const Ball& ball) {
@@ -106,23 +119,25 @@ void AutoMethod::startWindow() {
   window_collisions_ = counted.ball_collisions;
 }
 
-std::uint64_t AutoMethod::eventsToLook() const {
+std::uint64_t AutoMethod::eventsToLook(std::uint64_t counted) const {
   const std::uint64_t length =
       kEventsPerBallAndLook * balls_.size() + (stepping_ ? 1 : kFewestImpacts);
-  const std::uint64_t passed = method_->statistics().events - window_events_;
+  const std::uint64_t passed = counted - window_events_;
   return passed < length ? length - passed : 0;
 }
 
 bool AutoMethod::advanceTo(Time target, std::uint64_t max_events) {
   if (numbers_.balls == 0 && movable_ > 0) survey();
+  std::uint64_t counted = method_->statistics().events;
   while (true) {
-    const std::uint64_t before = method_->statistics().events;
-    const bool reached = method_->advanceTo(target, std::min(max_events, eventsToLook()));
-    const std::uint64_t used = method_->statistics().events - before;
-    max_events -= std::min(max_events, used);
-    if (eventsToLook() == 0) {
+    const std::uint64_t before = counted;
+    const bool reached = method_->advanceTo(target, std::min(max_events, eventsToLook(before)));
+    counted = method_->statistics().events;
+    max_events -= std::min(max_events, counted - before);
+    if (eventsToLook(counted) == 0) {
       judge(look());
       startWindow();
+      counted = window_events_;
     }
     if (reached) return true;
     if (max_events == 0) return false;
@@ -237,7 +252,7 @@ void AutoMethod::considerCheaper(const Look& look) {
   SceneNumbers now_numbers = numbers_;
   now_numbers.collision_rate = look.collision_rate;
   now_numbers.mean_speed = look.mean_speed;
-  const MethodChoice best = chooseFor(now_numbers, settings_.tolerance, methodNames());
+  const MethodChoice best = chooseFor(now_numbers, settings_.tolerance, choices_);
   const std::optional<double> cost = estimatedCost(method_->name(), now_numbers);
   const std::optional<double> best_cost = estimatedCost(best.name, now_numbers);
   const bool dear = cost && best_cost && *cost > kMuchCheaper * *best_cost;

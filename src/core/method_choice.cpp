@@ -14,14 +14,18 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 
 // What a method takes, s: for an impact, and for the way of a ball by the mean distance of balls;
-// up to 10^4 balls, and from 10^5 on.
+// up to kNearBalls, and from kFarBalls on. And what each ball of the crowd adds to an impact.
 struct MethodCosts {
   const char* method;
   double impact, far_impact;
   double move, far_move;
+  double crowd;
 };
-constexpr std::array<MethodCosts, 2> kCosts = {{{"event_driven", 0.8e-6, 1.5e-6, 0.3e-6, 1.15e-6},
-                                                {"continuous", 1.15e-6, 1.8e-6, 0.48e-6, 0.78e-6}}};
+constexpr double kNearBalls = 5e3;  // fit into the cache
+constexpr double kFarBalls = 1e5;
+constexpr std::array<MethodCosts, 2> kCosts = {
+    {{"event_driven", 0.5e-6, 1.2e-6, 0.3e-6, 1.4e-6, 0.38e-6},
+     {"continuous", 1.4e-6, 2.3e-6, 0.34e-6, 0.46e-6, 0}}};
 
 // Balls of like size, as one: sums over pairs of classes stand for sums over pairs of balls.
 struct SizeClass {
@@ -240,6 +244,21 @@ double errorGrowth(const Mixture& mixture) {
   return fastest;
 }
 
+// See SceneNumbers::crowd.
+double crowdOf(const Mixture& mixture) {
+  double count = 0;
+  for (const SizeClass& size : mixture.classes) count += size.count;
+  double collisions = 0;  // 1/s, of all balls
+  double sum = 0;
+  for (const SizeClass& size : mixture.classes) {
+    if (size.fixed) continue;
+    const double collisions_of_size = size.count * mixture.rate(size);
+    collisions += collisions_of_size;
+    sum += collisions_of_size * std::pow(2 * size.radius, mixture.planar ? 2 : 3);
+  }
+  return collisions > 0 ? count / mixture.volume * sum / collisions : 0;
+}
+
 }  // namespace
 
 double enskogCollisionRate(const std::vector<Ball>& balls, double volume, bool planar) {
@@ -295,7 +314,9 @@ SceneNumbers sceneNumbers(const Surroundings& surroundings, const std::vector<Ba
   const double faster = std::sqrt(1 + fallen * count / speed2);
   numbers.mean_speed *= faster;
   numbers.collision_rate = rate * faster;
-  numbers.bits_per_collision = errorGrowth(Mixture(balls, numbers.volume, numbers.planar)) / rate;
+  const Mixture mixture(balls, numbers.volume, numbers.planar);
+  numbers.bits_per_collision = errorGrowth(mixture) / rate;
+  numbers.crowd = crowdOf(mixture);
   return numbers;
 }
 
@@ -310,17 +331,25 @@ std::optional<double> estimatedCost(const std::string& method, const SceneNumber
   if (costs == kCosts.end()) return std::nullopt;
   const auto count = static_cast<double>(numbers.balls);
   const double spacing = std::pow(numbers.volume / count, numbers.planar ? 1.0 / 2 : 1.0 / 3);
-  const double moves = spacing > 0 ? numbers.mean_speed / spacing : 0;   // 1/s
-  const double outside = std::clamp(std::log10(count / 1e4), 0.0, 1.0);  // of the cache
+  const double moves = spacing > 0 ? numbers.mean_speed / spacing : 0;  // 1/s
+  const double outside =                                                // of the cache, a share
+      std::clamp(std::log(count / kNearBalls) / std::log(kFarBalls / kNearBalls), 0.0, 1.0);
   const double of_move = costs->move + outside * (costs->far_move - costs->move);
-  const double of_impact = costs->impact + outside * (costs->far_impact - costs->impact);
+  const double of_impact =
+      costs->impact + outside * (costs->far_impact - costs->impact) + costs->crowd * numbers.crowd;
   return count * (of_move * moves + of_impact * numbers.collision_rate / 2);
+}
+
+std::vector<std::string> methodsThatKeep(SimultaneousImpacts policy) {
+  if (policy == SimultaneousImpacts::sequential) return methodNames();
+  return {"event_driven"};
 }
 
 MethodChoice chooseMethod(const std::string& name, const Scene& scene,
                           const std::vector<Ball>& balls) {
   if (name != "auto") return {name, "asked for"};
-  return chooseFor(sceneNumbers(scene.surroundings, balls), scene.tolerance, methodNames());
+  return chooseFor(sceneNumbers(scene.surroundings, balls), scene.tolerance,
+                   methodsThatKeep(scene.simultaneous_impacts));
 }
 
 MethodChoice chooseFor(const SceneNumbers& numbers, std::optional<double> tolerance,

@@ -25,6 +25,7 @@ class AutoRun {
     MethodSettings settings;
     settings.time_step = scene.time_step;
     settings.tolerance = scene.tolerance;
+    settings.simultaneous_impacts = scene.simultaneous_impacts;
     const MethodChoice choice = chooseMethod("auto", scene, balls_);
     method_ = std::make_unique<AutoMethod>(scene.surroundings, settings, choice);
     method_->setCollisionLog(&log_);
@@ -229,6 +230,37 @@ TEST(AutoMethod, elasticBallsUnderGravityStayExact) {
   EXPECT_EQ(run.name(), "event_driven");
   EXPECT_EQ(run.method().changes(), 0u);
   EXPECT_NEAR(run.energy(scene.surroundings) / before, 1, 1e-11);
+}
+
+// No stepping method takes impacts together: a flood is no reason to leave the one that does.
+TEST(AutoMethod, keepsTheMethodThatTakesImpactsTogether) {
+  Scene scene = stack(10, 0.01);
+  AutoRun sequential(scene);
+  sequential.advanceTo(0.2);
+  ASSERT_EQ(sequential.name(), "discrete") << "the scene floods by then";
+  scene.simultaneous_impacts = SimultaneousImpacts::simultaneous;
+  AutoRun together(scene);
+  together.advanceTo(0.2);
+  EXPECT_EQ(together.name(), "event_driven");
+  EXPECT_EQ(together.method().changes(), 0u);
+}
+
+TEST(AutoMethod, warnsOfOverlapBeyondTheTolerance) {
+  Scene scene = gas(0);
+  scene.fill.clear();
+  scene.surroundings.box.min = Vector3::Zero();
+  scene.surroundings.box.max = Vector3::Constant(10);
+  scene.tolerance = 1e-4;
+  scene.balls = {{Vector3(2, 5, 5), Vector3(1, 0, 0), 0.5, 1},
+                 {Vector3(5, 5, 5), Vector3(-1, 0, 0), 0.5, 1}};
+  AutoRun run(scene);
+  run.advanceTo(1.5);
+  EXPECT_EQ(run.method().statistics().ball_collisions, 1u);
+  EXPECT_EQ(run.method().warning(), "");
+  run.method().setMotion(0, Vector3(2, 5, 5), Vector3(1, 0, 0));
+  run.method().setMotion(1, Vector3(2.9, 5, 5), Vector3(-1, 0, 0));  // 0.1 m into the other
+  run.advanceTo(1.6);
+  EXPECT_EQ(run.method().warning().find("balls overlapped by 0.1 m"), 0u) << run.method().warning();
 }
 
 TEST(AutoMethod, takesChangesFromOutside) {
