@@ -184,6 +184,7 @@ inline std::vector<SceneKind> sceneKinds() {
   add("closed_3d_ratio_10", sizes(10), masses(1000), radius(0.15));
   add("closed_2d_ratio_1000", planar, sizes(1000), radius(0.2), count(24));
   add("closed_3d_ratio_1000", sizes(1000), radius(0.3), count(24), masses(1e6));
+  add("closed_3d_ratio_10000", sizes(1e4), radius(0.3), count(24), masses(1e6));
   add("closed_3d_fixed", fixed(5), radius(0.1));
   add("closed_2d_fixed", planar, fixed(4), masses(10));
   add("closed_3d_fast", fast);
