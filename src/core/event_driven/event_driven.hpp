@@ -389,7 +389,7 @@ class EventDriven final : public Method {
     coarsest_edge_ = coarsestEdge(grid_);
     renumber(balls);
     grid_.resize(bodies_.size());
-    if (listed_) lists_.reset(bodies_.size(), list_capacity_);
+    if (listed_) lists_.reset(bodies_.size(), std::max(lists_.capacity(), kFewestNeighbours));
     for (const Slot slot : slots_) place(slot);
     if (listed_) listAll();
     balls_at_layout_ = slots_.size();
@@ -616,18 +616,14 @@ class EventDriven final : public Method {
 
   void listAll() {
     for (const Slot slot : slots_) {
-      if (lists_.set(slot, neighboursOf(slot))) continue;
-      list_capacity_ = neighbours_.size() + 1;
-      lists_.widen(list_capacity_);
-      lists_.set(slot, neighbours_);
+      while (!lists_.set(slot, neighboursOf(slot))) lists_.widen(neighbours_.size());
     }
   }
 
-  // A new list for a ball with a new home; where there is no room, all is laid out anew.
+  // A new list for a ball with a new home.
   void relist(Slot slot) {
-    if (lists_.replace(slot, neighboursOf(slot))) return;
-    list_capacity_ += 2;
-    ready_ = false;
+    neighboursOf(slot);
+    while (!lists_.replace(slot, neighbours_)) lists_.widen(lists_.capacity() + 1);
   }
 
   // --- events
@@ -1191,6 +1187,7 @@ class EventDriven final : public Method {
   static constexpr Real kEventsPerBucket = 8;
   static constexpr std::size_t kCachedBalls = 4000;         // fit into a core's own caches
   static constexpr std::uint64_t kCrossingsPerLayout = 16;  // a ball
+  static constexpr std::size_t kFewestNeighbours = 11;      // that lists have room for
   static constexpr std::int32_t kFarthestCell = 1 << 30;
 
   Surroundings surroundings_;
@@ -1217,8 +1214,7 @@ class EventDriven final : public Method {
   CellCoordinates region_width_;  // in points of their lattice
   CellCoordinates region_round_;  // such points once round a periodic box
   Real list_reach_ = 0;           // m, largest sum of radii that the lists allow for
-  std::size_t list_capacity_ = 11;
-  Real coarsest_edge_ = 0;  // m, the shortest edge of a cell of the coarsest level
+  Real coarsest_edge_ = 0;        // m, the shortest edge of a cell of the coarsest level
   std::size_t balls_at_layout_ = 0;
   std::uint64_t crossings_ = 0;  // out of a cell or region
   std::uint64_t crossings_at_layout_ = 0;

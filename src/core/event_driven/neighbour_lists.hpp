@@ -71,15 +71,19 @@ class NeighbourLists {
   }
 
   /// Gives a ball a new list, and takes it out of and puts it into the others' accordingly.
-  /// @return false when some list has no room: then all lists have to be made anew
+  /// @return false, and nothing changed, when some list has no room
   bool replace(Slot slot, const std::vector<Slot>& neighbours) {
-    const Slot* const now = neighbours.data();
-    for (Slot* old = begin(slot); old != end(slot); ++old) {
-      if (!isAmong(*old, now, neighbours.size())) erase(*old, slot);
-    }
+    if (neighbours.size() > capacity()) return false;
+    newcomers_.clear();
     for (const Slot other : neighbours) {
       if (isAmong(other, begin(slot), count(slot))) continue;
       if (count(other) == capacity()) return false;
+      newcomers_.push_back(other);
+    }
+    for (Slot* old = begin(slot); old != end(slot); ++old) {
+      if (!isAmong(*old, neighbours.data(), neighbours.size())) erase(*old, slot);
+    }
+    for (const Slot other : newcomers_) {
       *end(other) = slot;
       ++countOf(other);
     }
@@ -114,6 +118,7 @@ class NeighbourLists {
   std::size_t stride_ = 1;
   HugePageVector<Slot> entries_;  // a count and a list for each slot
   HugePageVector<CellCoordinates> homes_;
+  std::vector<Slot> newcomers_;  // scratch
 };
 
 }  // namespace ball_sim::core
