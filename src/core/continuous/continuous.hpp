@@ -15,7 +15,8 @@
 // Gets right: everything hard and elastic or dissipative, any masses and radii, walls, gravity, at
 // any speed: no impact is missed, none is seen twice. Misses: contact that lasts. A ball comes to
 // rest on walls; a ball on another ball keeps bouncing, ever lower, down to a hum of 1e-6 of their
-// radii. Simultaneous impacts are taken one after the other, by the smaller ids first.
+// radii. Simultaneous impacts are taken one after the other, by the smaller ids first; the policy
+// `simultaneous` is refused.
 // Limits: 2^27 balls.
 #pragma once
 
