@@ -148,7 +148,7 @@ class EventDriven final : public Method {
         return false;
       }
       --max_events;
-      const auto due = queue_.pop(firstId(), secondId());
+      const auto due = queue_.pop(secondId());
       now_ = std::max(now_, due.time);
       ++statistics_.events;
       handle(due.slot);

@@ -46,6 +46,7 @@ struct alignas(64) Agenda {
   std::uint8_t level = 0;      ///< index into the grid's levels
   std::uint8_t crossing_axis = 0;
   std::int8_t crossing_direction = 0;  ///< -1 or +1
+  std::uint8_t stamp = 0;              ///< tells the entry at hand from those left behind
 
   Real due() const { return std::min(impact_time, crossing_time); }
 };
@@ -99,8 +100,7 @@ class EventQueue {
     ++in_year_;
     const std::uint32_t bucket = bucketOf(due);
     if (bucket <= current_) {
-      agendas_[slot].previous = kAtHand;
-      late_.push_back({due, order(slot), slot});
+      late_.push_back(entryOf(slot, order));
       std::push_heap(late_.begin(), late_.end(), isLater);
     } else {
       link(slot, heads_[bucket]);
@@ -126,7 +126,7 @@ class EventQueue {
     while (true) {
       while (position_ < sorted_.size() || !late_.empty()) {
         const Entry& first = firstAtHand();
-        if (isLive(first, order)) return first.due <= limit;
+        if (isLive(first)) return first.due <= limit;
         skip();
       }
       if (in_year_ == 0) return false;
@@ -147,11 +147,11 @@ class EventQueue {
 
   /// Takes out the ball whose event isDue() has just found.
   /// @param later  later(slot): decides between events of one order, the smaller goes first
-  template <class Order, class Later>
-  Due pop(Order order, Later later) {
+  template <class Later>
+  Due pop(Later later) {
     Entry first = firstAtHand();
     skip();
-    if (isTied(first)) first = leastOfTies(first, order, later);
+    if (isTied(first)) first = leastOfTies(first, later);
     agendas_[first.slot].previous = kNotQueued;
     --in_year_;
     return {first.slot, first.due};
@@ -192,6 +192,7 @@ class EventQueue {
     Real due;
     BallId order;
     Slot slot;
+    std::uint8_t stamp;
 
     bool operator<(const Entry& other) const {
       return due != other.due ? due < other.due : order < other.order;
@@ -201,17 +202,24 @@ class EventQueue {
   // The standard heap has the largest on top.
   static bool isLater(const Entry& a, const Entry& b) { return b < a; }
 
-  bool isBeyondYear(Real due) const { return !(due * per_width_ < Real(buckets_)); }
+  bool isBeyondYear(Real due) const { return !(due < yearLength()); }
   std::uint32_t bucketOf(Real due) const {
-    return due > 0 ? static_cast<std::uint32_t>(due * per_width_) : 0;
+    const auto bucket = due > 0 ? static_cast<std::uint32_t>(due * per_width_) : 0;
+    return std::min(bucket, buckets_ - 1);  // 1/width is rounded
+  }
+
+  // A ball comes to the bucket at hand.
+  template <class Order>
+  Entry entryOf(Slot slot, Order order) {
+    Agenda<Real>& agenda = agendas_[slot];
+    agenda.previous = kAtHand;
+    return {agenda.due(), order(slot), slot, ++agenda.stamp};
   }
 
   // Not left behind by a ball that was taken out, perhaps to come back with another event.
-  template <class Order>
-  bool isLive(const Entry& entry, Order order) const {
+  bool isLive(const Entry& entry) const {
     const Agenda<Real>& agenda = agendas_[entry.slot];
-    return agenda.previous == kAtHand && agenda.due() == entry.due &&
-           order(entry.slot) == entry.order;
+    return agenda.previous == kAtHand && agenda.stamp == entry.stamp;
   }
 
   // --- the bucket at hand
@@ -242,11 +250,11 @@ class EventQueue {
   }
 
   // Of the live entries that tie with `first`, the one to go first; the others stay.
-  template <class Order, class Later>
-  Entry leastOfTies(const Entry& first, Order order, Later later) {
+  template <class Later>
+  Entry leastOfTies(const Entry& first, Later later) {
     tied_.assign(1, first);
     while (isTied(first)) {
-      if (isLive(firstAtHand(), order)) tied_.push_back(firstAtHand());
+      if (isLive(firstAtHand())) tied_.push_back(firstAtHand());
       skip();
     }
     const auto least =
@@ -266,8 +274,7 @@ class EventQueue {
   void openBucket(Order order) {
     sorted_.clear();
     for (Slot slot = heads_[current_]; slot != kNoSlot; slot = agendas_[slot].next) {
-      agendas_[slot].previous = kAtHand;
-      sorted_.push_back({agendas_[slot].due(), order(slot), slot});
+      sorted_.push_back(entryOf(slot, order));
     }
     heads_[current_] = kNoSlot;
     position_ = 0;
