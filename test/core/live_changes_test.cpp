@@ -44,6 +44,21 @@ TEST_P(LiveChanges, aRemovedBallIsNotHit) {
   EXPECT_EQ(run.states().ids, std::vector<BallId>{0});
 }
 
+TEST_P(LiveChanges, whoLosesItsPartnerToANewBallGoesOn) {
+  TestScene scene;  // ball 2 flies towards ball 0, and ball 1 stands behind that
+  scene.balls = {{Vector3(5, 0, 0), Vector3::Zero(), 0.5, 1},
+                 {Vector3(10, 0, 0), Vector3::Zero(), 0.5, 1},
+                 {Vector3(0, 0, 0), Vector3(1, 0, 0), 0.5, 1}};
+  Trial run(GetParam(), scene);
+  run.advanceTo(1);
+  run.method().remove(0);
+  run.method().insert(3, {Vector3(0, 5, 0), Vector3::Zero(), 0.5, 1});
+  run.advanceTo(20);
+  ASSERT_EQ(run.collisions().size(), 1u);
+  EXPECT_EQ(run.collisions()[0].time.seconds(), 9);
+  EXPECT_EQ(run.collisions()[0].a, 1u);
+}
+
 TEST_P(LiveChanges, aRemovedAndReplacedBallIsNotConfused) {
   Trial run(GetParam(), two());
   run.advanceTo(3.5);
