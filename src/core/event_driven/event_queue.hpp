@@ -81,7 +81,6 @@ class EventQueue {
 
   Real yearLength() const { return width_ * Real(buckets_); }
   Real bucketWidth() const { return width_; }
-  std::uint32_t buckets() const { return buckets_; }
   std::size_t bytes() const {
     return heads_.capacity() * sizeof(Slot) +
            (sorted_.capacity() + late_.capacity() + tied_.capacity()) * sizeof(Entry);
