@@ -41,12 +41,11 @@ struct alignas(64) Agenda {
   std::uint32_t version = 0;          ///< counts the changes of this ball's trajectory
   BallId id = 0;
   CellCoordinates cell = {0, 0, 0};
-  Slot next = kNoSlot;         ///< in the list of its bucket
+  Slot next = kNoSlot;         ///< in the list of its bucket; at hand, the stamp of its entry
   Slot previous = kNotQueued;  ///< likewise, or one of the marks above
   std::uint8_t level = 0;      ///< index into the grid's levels
   std::uint8_t crossing_axis = 0;
   std::int8_t crossing_direction = 0;  ///< -1 or +1
-  std::uint8_t stamp = 0;              ///< tells the entry at hand from those left behind
 
   Real due() const { return std::min(impact_time, crossing_time); }
 };
@@ -191,7 +190,7 @@ class EventQueue {
     Real due;
     BallId order;
     Slot slot;
-    std::uint8_t stamp;
+    std::uint32_t stamp;  // tells it from those that the ball has left behind
 
     bool operator<(const Entry& other) const {
       return due != other.due ? due < other.due : order < other.order;
@@ -212,13 +211,14 @@ class EventQueue {
   Entry entryOf(Slot slot, Order order) {
     Agenda<Real>& agenda = agendas_[slot];
     agenda.previous = kAtHand;
-    return {agenda.due(), order(slot), slot, ++agenda.stamp};
+    agenda.next = ++stamps_;
+    return {agenda.due(), order(slot), slot, stamps_};
   }
 
   // Not left behind by a ball that was taken out, perhaps to come back with another event.
   bool isLive(const Entry& entry) const {
     const Agenda<Real>& agenda = agendas_[entry.slot];
-    return agenda.previous == kAtHand && agenda.stamp == entry.stamp;
+    return agenda.previous == kAtHand && agenda.next == entry.stamp;
   }
 
   // --- the bucket at hand
@@ -272,7 +272,8 @@ class EventQueue {
   template <class Order>
   void openBucket(Order order) {
     sorted_.clear();
-    for (Slot slot = heads_[current_]; slot != kNoSlot; slot = agendas_[slot].next) {
+    for (Slot slot = heads_[current_], next; slot != kNoSlot; slot = next) {
+      next = agendas_[slot].next;
       sorted_.push_back(entryOf(slot, order));
     }
     heads_[current_] = kNoSlot;
@@ -336,6 +337,7 @@ class EventQueue {
   std::size_t position_ = 0;   // of the next in sorted_
   std::vector<Entry> late_;    // heap of those that came late into the bucket at hand
   std::vector<Entry> tied_;    // scratch of leastOfTies()
+  std::uint32_t stamps_ = 0;   // the last one given
   std::size_t in_year_ = 0;    // events queued that are not beyond the year
 };
 
