@@ -18,6 +18,7 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "ball_sim/surroundings.hpp"
@@ -74,11 +75,12 @@ struct Candidates {
 /// The balls in one cell: the first few beside each other, so that they are copied without a
 /// branch on how many there are.
 struct alignas(16) Cell {
-  static constexpr std::uint32_t kInPlace = 3;  // all bits set
+  static constexpr std::uint8_t kMostInPlace = 3;
 
-  /// Beyond three balls the last of these is the head of a chain that holds the third and later.
-  std::array<Slot, kInPlace> slots = {kNoSlot, kNoSlot, kNoSlot};
-  std::uint32_t count = 0;
+  /// In a chained cell the last of these is the head of a chain that holds the third and later.
+  std::array<Slot, kMostInPlace> slots = {kNoSlot, kNoSlot, kNoSlot};
+  std::uint8_t in_place = 0;    ///< so many of them are valid
+  std::uint8_t is_chained = 0;  ///< 1: there are more than fit in place
 };
 
 /// One level of cells, and who is in them.
@@ -93,8 +95,8 @@ class CellLevel {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       mask_[axis] = open[axis] ? static_cast<std::int32_t>(counts[axis]) - 1 : -1;
       neighbours_[axis] = axisNeighbours(counts[axis], periodic[axis] || open[axis], stride);
-      // A row has one cell more, always empty: the neighbour along x where there is none.
-      stride *= axis == 0 ? counts[axis] + 1 : counts[axis];
+      // One more, always empty, is the neighbour where there is none.
+      stride *= axis < 2 ? counts[axis] + 1 : counts[axis];
     }
     cells_.resize(stride);
   }
@@ -121,30 +123,21 @@ class CellLevel {
 
   void link(Slot slot, std::uint32_t index) {
     Cell& cell = cells_[index];
-    if (cell.count < Cell::kInPlace) {
-      cell.slots[cell.count] = slot;
-      next_[slot] = kNoSlot;
-    } else {
-      next_[slot] = cell.slots[2];
-      cell.slots[2] = slot;
+    if (cell.in_place < Cell::kMostInPlace) {
+      cell.slots[cell.in_place++] = slot;
+      return;
     }
-    ++cell.count;
+    if (!cell.is_chained) next_[cell.slots.back()] = kNoSlot;
+    next_[slot] = std::exchange(cell.slots.back(), slot);
+    cell.is_chained = 1;
   }
 
   void unlink(Slot slot, std::uint32_t index) {
     Cell& cell = cells_[index];
-    const std::uint32_t last = std::min(cell.count, Cell::kInPlace) - 1;
-    std::uint32_t i = 0;
-    while (i < 2 && cell.slots[i] != slot) ++i;
-    if (i < 2) {
-      cell.slots[i] = cell.slots[last];  // the gap takes the last, or the chain's head
-      dropLast(cell, last);
-    } else {
-      Slot* at = &cell.slots[2];
-      while (*at != slot) at = &next_[*at];
-      *at = next_[slot];
-    }
-    --cell.count;
+    if (cell.is_chained) return unlinkFromChain(slot, cell);
+    // What stands behind the valid ones may be anybody: the first is the right one.
+    const std::size_t i = cell.slots[0] == slot ? 0 : cell.slots[1] == slot ? 1 : 2;
+    cell.slots[i] = cell.slots[--cell.in_place];
   }
 
   void linkGuest(Slot slot, std::uint32_t index) {
@@ -162,36 +155,43 @@ class CellLevel {
     (before != kNoSlot ? next_[before] : guests_[index]) = after;
   }
 
+  /// Fetches the 27 cells around `c` from memory.
   void prefetchAround(const CellCoordinates& c) const {
-    const AxisNeighbours& x = neighbours(0, c[0]);
-    const AxisNeighbours& y = neighbours(1, c[1]);
+    prefetchRows<3>(neighbours(1, c[1]).cell.data(), sideOf(neighbours(2, c[2])),
+                    neighbours(0, c[0]).cell[1]);
+  }
+
+  /// The same of the cell itself, and of the layer that gatherLayer() looks at.
+  void prefetchLayer(const CellCoordinates& c, std::size_t axis, std::size_t direction) const {
+    const std::uint32_t x = neighbours(0, c[0]).cell[axis == 0 ? direction : 1];
+    const std::uint32_t* const y = neighbours(1, c[1]).cell.data();
     const AxisNeighbours& z = neighbours(2, c[2]);
-    for (std::size_t k = z.begin; k < z.end; ++k) {
-      for (std::size_t j = y.begin; j < y.end; ++j) {
-        __builtin_prefetch(&cells_[z.cell[k] + y.cell[j] + x.cell[1]]);
-      }
+    __builtin_prefetch(&cells_[cellIndex(c)]);
+    if (axis == 1) {
+      prefetchRows<1>(y + direction, sideOf(z), x);
+    } else {
+      prefetchRows<3>(y, axis == 2 ? layerOf(z, direction) : sideOf(z), x);
     }
   }
 
   /// Adds the members of the 27 cells around `c`, and the guests there if `with_guests`.
   void gather(const CellCoordinates& c, bool with_guests, Candidates& candidates) const {
-    const auto& x = neighbours(0, c[0]).cell;
-    gatherRows<3>(x.data(), sideOf(neighbours(1, c[1])), sideOf(neighbours(2, c[2])), with_guests,
-                  candidates);
+    gatherCells<3, 3>(neighbours(0, c[0]).cell.data(), neighbours(1, c[1]).cell.data(),
+                      sideOf(neighbours(2, c[2])), with_guests, candidates);
   }
 
   /// The same of their layer at `direction` (0 lower, 2 upper) of `axis` alone.
   void gatherLayer(const CellCoordinates& c, std::size_t axis, std::size_t direction,
                    bool with_guests, Candidates& candidates) const {
-    const AxisNeighbours& x = neighbours(0, c[0]);
-    const AxisNeighbours& y = neighbours(1, c[1]);
+    const std::uint32_t* const x = neighbours(0, c[0]).cell.data();
+    const std::uint32_t* const y = neighbours(1, c[1]).cell.data();
     const AxisNeighbours& z = neighbours(2, c[2]);
     if (axis == 0) {
-      gatherRows<1>(&x.cell[direction], sideOf(y), sideOf(z), with_guests, candidates);
+      gatherCells<1, 3>(x + direction, y, sideOf(z), with_guests, candidates);
     } else if (axis == 1) {
-      gatherRows<3>(x.cell.data(), layerOf(y, direction), sideOf(z), with_guests, candidates);
+      gatherCells<3, 1>(x, y + direction, sideOf(z), with_guests, candidates);
     } else {
-      gatherRows<3>(x.cell.data(), sideOf(y), layerOf(z, direction), with_guests, candidates);
+      gatherCells<3, 3>(x, y, layerOf(z, direction), with_guests, candidates);
     }
   }
 
@@ -218,37 +218,47 @@ class CellLevel {
     return {near.cell.data() + direction, near.cell.data() + direction + (is_there ? 1 : 0)};
   }
 
-  // What 27 cells are copied to, their counts included.
+  // What 27 cells are copied to, all of each.
   static constexpr std::size_t kMostInPlace = 27 * sizeof(Cell) / sizeof(Slot);
 
-  template <std::size_t kColumns>
-  void gatherRows(const std::uint32_t* columns, Side ys, Side zs, bool with_guests,
-                  Candidates& candidates) const {
+  template <std::size_t kRows>
+  void prefetchRows(const std::uint32_t* rows, Side planes, std::uint32_t column) const {
+    for (const std::uint32_t* z = planes.begin; z != planes.end; ++z) {
+      for (std::size_t j = 0; j < kRows; ++j) __builtin_prefetch(&cells_[*z + rows[j] + column]);
+    }
+  }
+
+  template <std::size_t kColumns, std::size_t kRows>
+  void gatherCells(const std::uint32_t* columns, const std::uint32_t* rows, Side planes,
+                   bool with_guests, Candidates& candidates) const {
     candidates.reserve(kMostInPlace);
     std::array<std::uint32_t, kColumns> x;
+    std::array<std::uint32_t, kRows> y;
     std::copy_n(columns, kColumns, x.begin());
+    std::copy_n(rows, kRows, y.begin());
+    const Cell* const cells = cells_.data();
     Slot* const begin = candidates.slots.data() + candidates.count;
     Slot* at = begin;
-    std::uint32_t fullest = 0;
-    for (const std::uint32_t* z = zs.begin; z != zs.end; ++z) {
-      for (const std::uint32_t* y = ys.begin; y != ys.end; ++y) {
-        const Cell* const row = &cells_[*z + *y];
+    unsigned is_chained = 0;
+    for (const std::uint32_t* z = planes.begin; z != planes.end; ++z) {
+      for (std::size_t j = 0; j < kRows; ++j) {
+        const Cell* const row = cells + *z + y[j];
         for (std::size_t i = 0; i < kColumns; ++i) {
           const Cell& cell = row[x[i]];
           // One copy of the whole cell; what is too much is overwritten by the next.
           std::memcpy(at, &cell, sizeof(Cell));
-          at += std::min(cell.count, Cell::kInPlace);
-          fullest |= cell.count;  // beyond kInPlace as soon as one is
+          at += cell.in_place;
+          is_chained |= cell.is_chained;
         }
       }
     }
     candidates.count += static_cast<std::size_t>(at - begin);
-    if (fullest <= Cell::kInPlace && !with_guests) return;
-    for (const std::uint32_t* z = zs.begin; z != zs.end; ++z) {
-      for (const std::uint32_t* y = ys.begin; y != ys.end; ++y) {
-        for (std::size_t i = 0; i < kColumns; ++i) {
-          const std::uint32_t cell = *z + *y + x[i];
-          if (cells_[cell].count > Cell::kInPlace) gatherChain(cells_[cell], candidates);
+    if (is_chained == 0 && !with_guests) return;
+    for (const std::uint32_t* z = planes.begin; z != planes.end; ++z) {
+      for (const std::uint32_t row : y) {
+        for (const std::uint32_t column : x) {
+          const std::uint32_t cell = *z + row + column;
+          if (cells_[cell].is_chained) gatherChain(cells_[cell], candidates);
           if (with_guests) gatherGuests(cell, candidates);
         }
       }
@@ -261,11 +271,19 @@ class CellLevel {
 
   // What a cell holds beyond the first few.
   void gatherChain(const Cell& cell, Candidates& candidates) const {
-    for (Slot s = next_[cell.slots[2]]; s != kNoSlot; s = next_[s]) candidates.add(s);
+    for (Slot s = next_[cell.slots.back()]; s != kNoSlot; s = next_[s]) candidates.add(s);
   }
 
-  void dropLast(Cell& cell, std::uint32_t last) {
-    cell.slots[last] = last == 2 ? next_[cell.slots[2]] : kNoSlot;
+  void unlinkFromChain(Slot slot, Cell& cell) {
+    if (cell.slots[0] == slot || cell.slots[1] == slot) {  // the gap takes the chain's head
+      const Slot head = std::exchange(cell.slots.back(), next_[cell.slots.back()]);
+      cell.slots[cell.slots[0] == slot ? 0 : 1] = head;
+    } else {
+      Slot* at = &cell.slots.back();
+      while (*at != slot) at = &next_[*at];
+      *at = next_[slot];
+    }
+    cell.is_chained = next_[cell.slots.back()] != kNoSlot ? 1 : 0;
   }
 
   // On an axis of one or two cells that wraps the neighbours are cells already listed.
@@ -314,6 +332,7 @@ struct Lattice {
   std::array<Real, 3> half{};     ///< m, half the edge of a cube
   /// Coordinates, along each axis, of the cubes that have no way out towards lower and upper.
   std::array<std::array<std::int32_t, 2>, 3> end{};
+  bool has_ends = false;  ///< whether there are any such
 };
 
 /// All levels, and the geometry they share.
@@ -336,6 +355,7 @@ class CellGrid {
     for (std::size_t level = 0; level < levels_.size(); ++level) {
       lattices_.push_back(lattice(levels_[level].depth()));
       for (std::size_t k = 0; k < 3; ++k) {
+        lattices_[level].has_ends |= axes_[k].lower_wall || axes_[k].upper_wall;
         if (axes_[k].lower_wall) lattices_[level].end[k][0] = 0;
         if (axes_[k].upper_wall) lattices_[level].end[k][1] = count(k, level) - 1;
       }
@@ -350,7 +370,10 @@ class CellGrid {
       lattice.spacing[k] = ldexp(axes_[k].edge, -depth);
       lattice.half[k] = lattice.spacing[k] / 2;
       lattice.first[k] = axes_[k].origin + lattice.half[k];
-      if (axes_[k].flat) continue;
+      if (axes_[k].flat) {
+        lattice.has_ends = true;
+        continue;
+      }
       lattice.end[k] = {std::numeric_limits<std::int32_t>::min(),
                         std::numeric_limits<std::int32_t>::max()};
     }
@@ -444,9 +467,10 @@ class CellGrid {
   void gatherNear(const CellCoordinates& coordinates, std::size_t level,
                   Candidates& candidates) const {
     candidates.count = 0;
-    for (std::size_t m = 0; m <= level; ++m) {
-      levels_[m].gather(inLevel(coordinates, level, m), m == level && levels_[m].hasGuests(),
-                        candidates);
+    const CellLevel& own = levels_[level];
+    own.gather(coordinates, own.hasGuests(), candidates);
+    for (std::size_t m = 0; m < level; ++m) {
+      levels_[m].gather(inLevel(coordinates, level, m), false, candidates);
     }
     candidates.close();
   }
@@ -460,17 +484,33 @@ class CellGrid {
                       Candidates& candidates) const {
     candidates.count = 0;
     const std::size_t direction = unwrapped[axis] > before[axis] ? 2 : 0;
-    for (std::size_t m = 0; m <= level; ++m) {
+    const CellLevel& own = levels_[level];
+    own.gatherLayer(after, axis, direction, own.hasGuests(), candidates);
+    for (std::size_t m = 0; m < level; ++m) {
       if (inLevel(unwrapped, level, m)[axis] == inLevel(before, level, m)[axis]) continue;
-      levels_[m].gatherLayer(inLevel(after, level, m), axis, direction,
-                             m == level && levels_[m].hasGuests(), candidates);
+      levels_[m].gatherLayer(inLevel(after, level, m), axis, direction, false, candidates);
     }
     candidates.close();
   }
 
-  /// Fetches the cells around a ball from memory.
+  /// Fetches from memory the cells of a ball's own level that gatherNear() will look at.
   void prefetchNear(const CellCoordinates& c, std::size_t level) const {
     levels_[level].prefetchAround(c);
+  }
+
+  /// Of a ball that will cross next, the cell it will be in and the layer that will be new.
+  void prefetchNewLayer(const CellCoordinates& before, std::size_t level, std::size_t axis,
+                        int direction) const {
+    levels_[level].prefetchLayer(behind(before, level, axis, direction), axis,
+                                 direction > 0 ? 2 : 0);
+  }
+
+  /// Finds the balls in that layer, without those of other levels.
+  void foreseeNewLayer(const CellCoordinates& before, std::size_t level, std::size_t axis,
+                       int direction, Candidates& candidates) const {
+    candidates.count = 0;
+    levels_[level].gatherLayer(behind(before, level, axis, direction), axis, direction > 0 ? 2 : 0,
+                               false, candidates);
   }
 
   std::size_t bytes() const {
@@ -482,6 +522,16 @@ class CellGrid {
  private:
   CellCoordinates inLevel(const CellCoordinates& c, std::size_t level, std::size_t coarse) const {
     return coarser(c, levels_[level].depth(), levels_[coarse].depth());
+  }
+
+  // The next cell, in the periodic box.
+  CellCoordinates behind(CellCoordinates c, std::size_t level, std::size_t axis,
+                         int direction) const {
+    c[axis] += direction;
+    if (!axes_[axis].periodic) return c;
+    const std::int32_t cells = count(axis, level);
+    c[axis] = c[axis] < 0 ? cells - 1 : c[axis] == cells ? 0 : c[axis];
+    return c;
   }
 
   std::array<GridAxis<Real>, 3> axes_;

@@ -26,6 +26,7 @@
 #include <cstdlib>
 #include <optional>
 #include <stdexcept>
+#include <tuple>
 #include <vector>
 
 #include "ball_sim/collapse_guard.hpp"
@@ -60,7 +61,7 @@ class EventDriven final : public Method {
         restitution_(Real(surroundings.restitution)),
         walls_(wallsOf<Real>(surroundings)),
         contacts_(surroundings.gravity.cast<Real>()),
-        queue_(agendas_) {
+        queue_(agendas_, GoesFirst{this}) {
     for (std::size_t k = 0; k < walls_.size(); ++k) {
       const Partner partner = walls_[k].partner;
       if (partner > planePartner(0)) {
@@ -100,7 +101,7 @@ class EventDriven final : public Method {
     const Slot slot = *found;
     if (ready_) {
       lift(slot);
-      if (listed_) lists_.replace(slot, {});
+      if (listed_) lists_.renew(slot, nullptr, 0);
     }
     ++agendas_[slot].version;
     slots_.erase(found);
@@ -134,24 +135,22 @@ class EventDriven final : public Method {
     while (true) {
       if (!ready_) layOut();
       const Real limit = Real(target - origin_);
-      if (!queue_.isDue(limit, firstId(), expectation())) {
-        if (limit < queue_.yearLength()) {
-          now_ = limit;
-          reached_ = target;
-          return true;
+      while (queue_.isDue(limit, expectation())) {
+        if (max_events-- == 0) {
+          reached_ = origin_ + double(now_);
+          return false;
         }
-        turnYear(limit);
-        continue;
+        const auto due = queue_.pop();
+        now_ = std::max(now_, due.time);
+        ++statistics_.events;
+        handle(due.slot);
       }
-      if (max_events == 0) {
-        reached_ = origin_ + double(now_);
-        return false;
+      if (limit < queue_.yearLength()) {
+        now_ = limit;
+        reached_ = target;
+        return true;
       }
-      --max_events;
-      const auto due = queue_.pop(secondId());
-      now_ = std::max(now_, due.time);
-      ++statistics_.events;
-      handle(due.slot);
+      turnYear(limit);
     }
   }
   using Method::advanceTo;
@@ -216,6 +215,12 @@ class EventDriven final : public Method {
     std::uint32_t partner = 0;
   };
 
+  // Balls as PairSearch takes them.
+  struct Near {
+    const Slot* slots;
+    std::size_t count;
+  };
+
   template <class Vector>
   static std::size_t capacityBytes(const Vector& v) {
     return v.capacity() * sizeof(typename Vector::value_type);
@@ -250,21 +255,21 @@ class EventDriven final : public Method {
   bool isFixed(Slot slot) const { return std::isinf(agendas_[slot].mass); }
   Real inverseMass(Slot slot) const { return 1 / Real(agendas_[slot].mass); }  // 1/kg; 0: fixed
 
-  // Order of events at one instant: smaller id first, then walls, then larger id.
-  auto firstId() const {
-    return [this](Slot slot) {
-      const Agenda<Real>& agenda = agendas_[slot];
-      if (agenda.crossing_time < agenda.impact_time || agenda.partner >= kWall) return agenda.id;
-      return std::min(agenda.id, agendas_[agenda.partner].id);
-    };
-  }
-  auto secondId() const {
-    return [this](Slot slot) -> Partner {
-      const Agenda<Real>& agenda = agendas_[slot];
-      if (agenda.crossing_time < agenda.impact_time) return agenda.id;
-      if (agenda.partner >= kWall) return walls_[agenda.partner - kWall].partner;
-      return std::max(agenda.id, agendas_[agenda.partner].id);
-    };
+  // Of events at one instant the one with the smaller of its two ids goes first, then by the other
+  // id, where a wall comes before all balls.
+  struct GoesFirst {
+    const EventDriven* method;
+    bool operator()(Slot a, Slot b) const { return method->rank(a) < method->rank(b); }
+  };
+
+  std::tuple<BallId, Partner, Slot> rank(Slot slot) const {
+    const Agenda<Real>& agenda = agendas_[slot];
+    if (agenda.crossing_time < agenda.impact_time) return {agenda.id, agenda.id, slot};
+    if (agenda.partner >= kWall) {
+      return {agenda.id, walls_[agenda.partner - kWall].partner, slot};
+    }
+    const BallId other = agendas_[agenda.partner].id;
+    return {std::min(agenda.id, other), std::max(agenda.id, other), slot};
   }
 
   // Fetches from memory what balls that come up soon will need: each step needs what the one
@@ -272,31 +277,52 @@ class EventDriven final : public Method {
   auto expectation() {
     return [this](Slot slot, std::uint32_t buckets_ahead) {
       const Agenda<Real>& agenda = agendas_[slot];
-      const bool meets = agenda.impact_time <= agenda.crossing_time && agenda.partner < kWall;
-      if (buckets_ahead == EventQueue<Real>::kSoon) {
+      const bool crosses = agenda.crossing_time < agenda.impact_time;
+      const bool meets = !crosses && agenda.partner < kWall;
+      if (buckets_ahead == EventQueue<Real, GoesFirst>::kSoon) {
         __builtin_prefetch(&bodies_[slot]);
+        if (listed_) lists_.prefetch(slot);
         if (meets) {
           __builtin_prefetch(&bodies_[agenda.partner]);
           __builtin_prefetch(&agendas_[agenda.partner]);
+          if (listed_) lists_.prefetch(agenda.partner);
         }
-        if (listed_) lists_.prefetch(slot);
-      } else if (buckets_ahead == EventQueue<Real>::kSooner) {
-        if (!listed_) grid_.prefetchNear(agenda.cell, agenda.level);
-        if (listed_ && meets) lists_.prefetch(agenda.partner);
-      } else if (listed_) {
-        prefetchBodies(lists_.of(slot), lists_.count(slot));
+      } else if (buckets_ahead == EventQueue<Real, GoesFirst>::kSooner) {
+        if (crosses) prefetchNewCells(agenda);
+        if (!crosses && !listed_) grid_.prefetchNear(agenda.cell, agenda.level);
+      } else if (crosses) {
+        prefetchNewcomers(slot);
       } else {
-        grid_.gatherNear(agenda.cell, agenda.level, candidates_);
-        prefetchBodies(candidates_.slots.data(), candidates_.count);
+        prefetchBodies(nearTo(slot));
+        if (meets) prefetchBodies(nearTo(agenda.partner));
       }
     };
   }
 
-  void prefetchBodies(const Slot* slots, std::size_t count) const {
-    for (std::size_t i = 0; i < count; ++i) __builtin_prefetch(&bodies_[slots[i]]);
+  void prefetchNewCells(const Agenda<Real>& agenda) const {
+    if (listed_) {
+      grid_.prefetchNear(agenda.cell, agenda.level);
+    } else {
+      grid_.prefetchNewLayer(agenda.cell, agenda.level, agenda.crossing_axis,
+                             agenda.crossing_direction);
+    }
   }
 
-  void enqueue(Slot slot) { queue_.insert(slot, firstId()); }
+  void prefetchNewcomers(Slot slot) {
+    const Agenda<Real>& agenda = agendas_[slot];
+    if (listed_) {
+      const Near near = inCellsAround(slot);
+      for (std::size_t i = 0; i < near.count; ++i) lists_.prefetchHome(near.slots[i]);
+    } else {
+      grid_.foreseeNewLayer(agenda.cell, agenda.level, agenda.crossing_axis,
+                            agenda.crossing_direction, candidates_);
+      prefetchBodies({candidates_.slots.data(), candidates_.count});
+    }
+  }
+
+  void prefetchBodies(const Near& near) const {
+    for (std::size_t i = 0; i < near.count; ++i) __builtin_prefetch(&bodies_[near.slots[i]]);
+  }
 
   // --- motion between events
 
@@ -389,9 +415,13 @@ class EventDriven final : public Method {
     coarsest_edge_ = coarsestEdge(grid_);
     renumber(balls);
     grid_.resize(bodies_.size());
-    if (listed_) lists_.reset(bodies_.size(), std::max(lists_.capacity(), kFewestNeighbours));
+    if (listed_) lists_.reset(bodies_.size(), regions_);
     for (const Slot slot : slots_) place(slot);
-    if (listed_) listAll();
+    for (const Slot slot : slots_) {
+      if (!listed_) break;
+      const Near near = inCellsAround(slot);
+      lists_.fill(slot, near.slots, near.count);
+    }
     balls_at_layout_ = slots_.size();
     crossings_at_layout_ = crossings_;
     ready_ = true;
@@ -409,11 +439,13 @@ class EventDriven final : public Method {
       const Real half = Real(NeighbourLists::kHalfRegion) * largest;
       list_reach_ = 2 * largest * Real(kCellMargin);
       grid_ = layOutGrid<Real>(surroundings_, balls, 2 * half);
-      regions_ = grid_.lattice(NeighbourLists::kLatticeDepth);
+      homes_ = grid_.lattice(NeighbourLists::kLatticeDepth);
+      regions_.reach = static_cast<float>(list_reach_);
       for (std::size_t k = 0; k < 3; ++k) {
-        region_width_[k] = static_cast<std::int32_t>(2 * half / regions_.spacing[k]);
-        regions_.half[k] = Real(region_width_[k]) * regions_.spacing[k] / 2;
-        region_round_[k] = grid_.pointsRound(k, NeighbourLists::kLatticeDepth);
+        regions_.width[k] = static_cast<std::int32_t>(2 * half / homes_.spacing[k]);
+        regions_.round[k] = grid_.pointsRound(k, NeighbourLists::kLatticeDepth);
+        regions_.spacing[k] = static_cast<float>(homes_.spacing[k]);
+        homes_.half[k] = Real(regions_.width[k]) * homes_.spacing[k] / 2;
       }
       listed_ = nearestImagesSuffice(grid_);
     }
@@ -491,7 +523,7 @@ class EventDriven final : public Method {
     // Clocks restart with the calendar.
     shiftClocks(now_);
     queue_.reset(floorToThreeBits(width), buckets);
-    for (const Slot slot : slots_) enqueue(slot);
+    for (const Slot slot : slots_) queue_.insert(slot);
     events_at_new_year_ = statistics_.events;
   }
 
@@ -529,7 +561,7 @@ class EventDriven final : public Method {
     for (const Slot slot : slots_) {
       if (bodies_[slot].time < -32 * year) settle(slot);
     }
-    queue_.turnYear(firstId());
+    queue_.turnYear();
     // Balls that have mixed lie at random in memory again, which matters beyond the caches.
     if (slots_.size() > kCachedBalls &&
         crossings_ - crossings_at_layout_ > kCrossingsPerLayout * slots_.size()) {
@@ -578,52 +610,16 @@ class EventDriven final : public Method {
   // Puts a ball that came while others fly among them.
   void settleIn(Slot slot) {
     place(slot);
-    if (listed_) relist(slot);
+    if (listed_) {
+      const Near near = inCellsAround(slot);
+      lists_.renew(slot, near.slots, near.count);
+    }
     search(slot);
   }
 
   void lift(Slot slot) {
     queue_.remove(slot);
     grid_.unlink(slot, agendas_[slot].cell, agendas_[slot].level);
-  }
-
-  // --- neighbour lists
-
-  // Those whose regions come within reach of this ball's.
-  const std::vector<Slot>& neighboursOf(Slot slot) {
-    grid_.gatherNear(agendas_[slot].cell, agendas_[slot].level, candidates_);
-    const CellCoordinates& home = lists_.home(slot);
-    neighbours_.resize(candidates_.count);
-    std::size_t count = 0;
-    for (std::size_t i = 0; i < candidates_.count; ++i) {
-      const Slot other = candidates_.slots[i];
-      const CellCoordinates& there = lists_.home(other);
-      Real squared = 0;
-      for (std::size_t k = 0; k < 3; ++k) {
-        const std::int32_t straight = std::abs(home[k] - there[k]);
-        const std::int32_t apart = std::min(straight, region_round_[k] - straight);
-        const Real gap = Real(std::max(apart - region_width_[k], 0)) * regions_.spacing[k];
-        squared += gap * gap;
-      }
-      // Without a branch, which would often be foretold wrongly.
-      neighbours_[count] = other;
-      const bool is_near = squared < list_reach_ * list_reach_;
-      count += static_cast<std::size_t>(is_near & (other != slot));
-    }
-    neighbours_.resize(count);
-    return neighbours_;
-  }
-
-  void listAll() {
-    for (const Slot slot : slots_) {
-      while (!lists_.set(slot, neighboursOf(slot))) lists_.widen(neighbours_.size());
-    }
-  }
-
-  // A new list for a ball with a new home.
-  void relist(Slot slot) {
-    neighboursOf(slot);
-    while (!lists_.replace(slot, neighbours_)) lists_.widen(lists_.capacity() + 1);
   }
 
   // --- events
@@ -664,7 +660,7 @@ class EventDriven final : public Method {
     considerWallsOf(slot, found);
     if (found.time < agenda.impact_time) setImpact(slot, found);
     findCrossing(slot);
-    enqueue(slot);
+    queue_.insert(slot);
   }
 
   // A ball that left the periodic box comes in again on the other side.
@@ -946,7 +942,7 @@ class EventDriven final : public Method {
   // Finds the next event of a ball that is not queued, and queues it.
   void search(Slot slot, const JustMet& met = {}) {
     findNextEvent(slot, met);
-    enqueue(slot);
+    queue_.insert(slot);
   }
 
   void findNextEvent(Slot slot, const JustMet& met = {}) {
@@ -957,15 +953,13 @@ class EventDriven final : public Method {
     findCrossing(slot);
   }
 
-  // Balls as PairSearch takes them.
-  struct Near {
-    const Slot* slots;
-    std::size_t count;
-  };
-
   // All that a ball can meet before its crossing, perhaps itself among them.
   Near nearTo(Slot slot) {
     if (listed_) return {lists_.of(slot), lists_.count(slot)};
+    return inCellsAround(slot);
+  }
+
+  Near inCellsAround(Slot slot) {
     grid_.gatherNear(agendas_[slot].cell, agendas_[slot].level, candidates_);
     return {candidates_.slots.data(), candidates_.count};
   }
@@ -987,7 +981,7 @@ class EventDriven final : public Method {
   // One ball in search of its next impact, and whom it has just parted from.
   struct Search {
     Slot slot;
-    JustMet met;
+    const JustMet& met;
     Seeker<Real> seeker;
   };
 
@@ -1010,13 +1004,18 @@ class EventDriven final : public Method {
     if (kGravity && !allFallFreely(search.slot, near)) return considerEach(search, near, found);
     const PairHit<Real> hit =
         search_pairs_(bodies_.data(), near.slots, near.count, search.seeker, space_);
-    if (!(now_ + hit.wait <= found.time)) return;
+    const Real time = now_ + hit.wait;
     const Slot other = near.slots[hit.index];
-    if (hit.tied || other == search.met.partner) {  // seldom, and then not so simple
+    const bool earlier = time < found.time;
+    const bool as_early = (time == found.time) & (hit.wait < kNever<Real>);
+    const bool met = (other == search.met.partner) & earlier;
+    if (as_early | hit.tied | met) {  // seldom, and then not so simple
       considerEach(search, near, found);
-    } else {
-      takeIfEarlier(other, now_ + hit.wait, found);
+      return;
     }
+    // Not by branches, which would often be foretold wrongly.
+    found.time = std::min(found.time, time);
+    found.partner = earlier ? other : found.partner;
   }
 
   bool allFallFreely(Slot slot, const Near& near) const {
@@ -1098,7 +1097,7 @@ class EventDriven final : public Method {
   // --- the way out of a ball's cell, or of the region around its home
 
   const Lattice<Real>& cubesOf(Slot slot) const {
-    return listed_ ? regions_ : grid_.latticeOf(agendas_[slot].level);
+    return listed_ ? homes_ : grid_.latticeOf(agendas_[slot].level);
   }
   const CellCoordinates& cubeOf(Slot slot) const {
     return listed_ ? lists_.home(slot) : agendas_[slot].cell;
@@ -1120,16 +1119,20 @@ class EventDriven final : public Method {
     const Vec x = positionNow(slot);
     const Vec& v = bodies_[slot].v;
     std::array<Real, 3> gap{};
-    std::array<Real, 3> speed{};  // 0: never leaves that way
+    std::array<Real, 3> speed{};
     const Lattice<Real>& cubes = cubesOf(slot);
     const CellCoordinates& cube = cubeOf(slot);
     for (std::size_t k = 0; k < 3; ++k) {
       const int i = static_cast<int>(k);
       const Real from_middle = x[i] - (cubes.first[k] + Real(cube[k]) * cubes.spacing[k]);
-      const Real towards = cubes.half[k] - std::copysign(from_middle, from_middle * v[i]);
+      const Real towards = cubes.half[k] - from_middle * std::copysign(Real(1), v[i]);
       gap[k] = std::max(towards, std::numeric_limits<Real>::min());
-      const std::int32_t end = cubes.end[k][v[i] < 0 ? 0 : 1];
-      speed[k] = cube[k] == end ? Real(0) : std::abs(v[i]);
+      speed[k] = std::abs(v[i]);
+    }
+    if (cubes.has_ends) {
+      for (std::size_t k = 0; k < 3; ++k) {  // where there is no way out
+        if (cube[k] == cubes.end[k][v[static_cast<int>(k)] < 0 ? 0 : 1]) speed[k] = 0;
+      }
     }
     std::size_t k = gap[1] * speed[0] < gap[0] * speed[1] ? 1 : 0;
     k = gap[2] * speed[k] < gap[k] * speed[2] ? 2 : k;
@@ -1184,10 +1187,9 @@ class EventDriven final : public Method {
     log_->add(collision);
   }
 
-  static constexpr Real kEventsPerBucket = 8;
+  static constexpr Real kEventsPerBucket = 4;
   static constexpr std::size_t kCachedBalls = 4000;         // fit into a core's own caches
   static constexpr std::uint64_t kCrossingsPerLayout = 16;  // a ball
-  static constexpr std::size_t kFewestNeighbours = 11;      // that lists have room for
   static constexpr std::int32_t kFarthestCell = 1 << 30;
 
   Surroundings surroundings_;
@@ -1209,23 +1211,21 @@ class EventDriven final : public Method {
 
   CellGrid<Real> grid_;
   NeighbourLists lists_;
-  bool listed_ = false;           // who is near is told by lists_, else by grid_ alone
-  Lattice<Real> regions_;         // of the lists
-  CellCoordinates region_width_;  // in points of their lattice
-  CellCoordinates region_round_;  // such points once round a periodic box
-  Real list_reach_ = 0;           // m, largest sum of radii that the lists allow for
-  Real coarsest_edge_ = 0;        // m, the shortest edge of a cell of the coarsest level
+  bool listed_ = false;     // who is near is told by lists_, else by grid_ alone
+  Lattice<Real> homes_;     // of the lists, with the regions around them
+  Regions regions_;         // the same, as the lists see them
+  Real list_reach_ = 0;     // m, largest sum of radii that the lists allow for
+  Real coarsest_edge_ = 0;  // m, the shortest edge of a cell of the coarsest level
   std::size_t balls_at_layout_ = 0;
   std::uint64_t crossings_ = 0;  // out of a cell or region
   std::uint64_t crossings_at_layout_ = 0;
   bool ready_ = false;  // grid, lists and queue hold all balls
-  EventQueue<Real> queue_;
+  EventQueue<Real, GoesFirst> queue_;
 
   PairSpace<Real> space_;
   PairSearch<Real> search_pairs_ = nullptr;
-  std::vector<Vec> images_;       // m, shifts of a ball to be looked at: none but in small boxes
-  Candidates candidates_;         // scratch of a search
-  std::vector<Slot> neighbours_;  // scratch of a new list
+  std::vector<Vec> images_;  // m, shifts of a ball to be looked at: none but in small boxes
+  Candidates candidates_;    // scratch of a search
 
   Time origin_;   // when this year began
   Real now_ = 0;  // s, in this year

@@ -11,7 +11,10 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
+#include <cstdint>
+#include <cstring>
 #include <utility>
 #include <vector>
 
@@ -20,6 +23,14 @@
 #include "event_driven/pair_search.hpp"
 
 namespace ball_sim::core {
+
+/// The regions around homes, in points of the lattice of homes.
+struct Regions {
+  CellCoordinates width{};         ///< edges of a region
+  CellCoordinates round{};         ///< once round a periodic box; else more than any two are apart
+  std::array<float, 3> spacing{};  ///< of the points, m
+  float reach = 0;                 ///< m, largest sum of two radii
+};
 
 class NeighbourLists {
  public:
@@ -30,14 +41,127 @@ class NeighbourLists {
   /// Homes lie on a lattice this many halvings finer than the cells.
   static constexpr int kLatticeDepth = 5;
 
-  /// Forgets all lists; room for `capacity` neighbours a ball.
-  void reset(std::size_t slots, std::size_t capacity) {
-    stride_ = capacity + 1;
+  /// Forgets all lists.
+  void reset(std::size_t slots, const Regions& regions) {
+    stride_ = std::max(stride_, kFewest + 1);
     entries_.assign(slots * stride_ + kSearchStep, 0);
-    homes_.assign(slots, CellCoordinates{});
+    homes_.assign(slots, Home{});
+    for (std::size_t k = 0; k < 3; ++k) {
+      width_[k] = regions.width[k];
+      round_[k] = regions.round[k];
+      spacing_[k] = regions.spacing[k];
+    }
+    // Wider by more than these few digits can err.
+    squared_reach_ = regions.reach * regions.reach * 1.00001F;
   }
 
-  /// Makes room for more neighbours a ball; the lists stay.
+  void resize(std::size_t slots) {
+    entries_.resize(slots * stride_ + kSearchStep);
+    homes_.resize(slots);
+  }
+
+  const Slot* of(Slot slot) const { return &entries_[slot * stride_ + 1]; }
+  std::size_t count(Slot slot) const { return entries_[slot * stride_]; }
+
+  /// In points of the lattice.
+  const CellCoordinates& home(Slot slot) const { return homes_[slot].at; }
+  void setHome(Slot slot, const CellCoordinates& home) { homes_[slot].at = home; }
+
+  /// Gives a ball its first list, and does not tell the neighbours.
+  /// @param candidates  all balls that might be near, perhaps itself among them
+  void fill(Slot slot, const Slot* candidates, std::size_t count) {
+    findNear(slot, candidates, count);
+    takeNear(slot);
+  }
+
+  /// Gives a ball with a new home a new list, and takes it out of and puts it into the others'
+  /// accordingly. Parameters as of fill().
+  void renew(Slot slot, const Slot* candidates, std::size_t count) {
+    findNear(slot, candidates, count);
+    for (Slot* old = begin(slot); old != end(slot); ++old) homes_[*old].mark = Mark::old;
+    for (const Slot other : near_) {
+      if (homes_[other].mark == Mark::old) {
+        homes_[other].mark = Mark::kept;
+      } else {
+        add(other, slot);
+      }
+    }
+    for (Slot* old = begin(slot); old != end(slot); ++old) {
+      if (homes_[*old].mark == Mark::old) erase(*old, slot);
+      homes_[*old].mark = Mark::none;
+    }
+    takeNear(slot);
+  }
+
+  /// Fetches a list from memory.
+  void prefetch(Slot slot) const { __builtin_prefetch(&entries_[slot * stride_]); }
+  void prefetchHome(Slot slot) const { __builtin_prefetch(&homes_[slot]); }
+
+  std::size_t bytes() const {
+    return entries_.capacity() * sizeof(Slot) + homes_.capacity() * sizeof(Home);
+  }
+
+ private:
+  static constexpr std::size_t kFewest = 11;  // neighbours that there is room for
+
+  enum class Mark : std::uint32_t { none, old, kept };
+
+  struct alignas(16) Home {
+    CellCoordinates at{};
+    Mark mark = Mark::none;  // scratch of renew()
+  };
+
+  // Along three axes, and a fourth number to fill the register.
+  using Whole = std::int32_t __attribute__((vector_size(16)));
+  using Metres = float __attribute__((vector_size(16)));
+
+  Whole homeOf(Slot slot) const {
+    Whole home;
+    std::memcpy(&home, &homes_[slot], sizeof(home));
+    return home;
+  }
+
+  // Those whose regions come within reach of this ball's.
+  void findNear(Slot slot, const Slot* candidates, std::size_t candidate_count) {
+    const Whole home = homeOf(slot);
+    near_.resize(candidate_count);
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < candidate_count; ++i) {
+      const Slot other = candidates[i];
+      const Whole way = homeOf(other) - home;
+      const Whole straight = way < 0 ? -way : way;
+      const Whole roundabout = round_ - straight;
+      const Whole gap = (straight < roundabout ? straight : roundabout) - width_;
+      const Metres apart = __builtin_convertvector(gap > 0 ? gap : gap * 0, Metres) * spacing_;
+      const Metres squares = apart * apart;
+      // Without a branch, which would often be foretold wrongly.
+      near_[count] = other;
+      const bool is_near = squares[0] + squares[1] + squares[2] < squared_reach_;
+      count += static_cast<std::size_t>(is_near & (other != slot));
+    }
+    near_.resize(count);
+  }
+
+  void takeNear(Slot slot) {
+    if (near_.size() > capacity()) widen(near_.size());
+    std::copy(near_.begin(), near_.end(), begin(slot));
+    countOf(slot) = static_cast<Slot>(near_.size());
+  }
+
+  void add(Slot to, Slot slot) {
+    if (count(to) == capacity()) widen(capacity() + 1);
+    *end(to) = slot;
+    ++countOf(to);
+  }
+
+  // Lists are short: to look at all of one is faster than to guess where to stop.
+  void erase(Slot from, Slot slot) {
+    Slot* const list = begin(from);
+    const Slot last = list[--countOf(from)];
+    for (std::size_t i = 0; i < count(from); ++i) list[i] = list[i] == slot ? last : list[i];
+  }
+
+  // Makes room for more neighbours a ball; the lists stay.
   void widen(std::size_t capacity) {
     const std::size_t narrow = std::exchange(stride_, capacity + 1);
     const HugePageVector<Slot> old = std::move(entries_);
@@ -47,78 +171,19 @@ class NeighbourLists {
     }
   }
 
-  void resize(std::size_t slots) {
-    entries_.resize(slots * stride_ + kSearchStep);
-    homes_.resize(slots);
-  }
-
   std::size_t capacity() const { return stride_ - 1; }
-
-  const Slot* of(Slot slot) const { return &entries_[slot * stride_ + 1]; }
-  std::size_t count(Slot slot) const { return entries_[slot * stride_]; }
-
-  /// In points of the lattice.
-  const CellCoordinates& home(Slot slot) const { return homes_[slot]; }
-  void setHome(Slot slot, const CellCoordinates& home) { homes_[slot] = home; }
-
-  /// Gives a ball a list, and does not tell the neighbours.
-  /// @return false, and nothing changed, when there is no room
-  bool set(Slot slot, const std::vector<Slot>& neighbours) {
-    if (neighbours.size() > capacity()) return false;
-    std::copy(neighbours.begin(), neighbours.end(), begin(slot));
-    countOf(slot) = static_cast<Slot>(neighbours.size());
-    return true;
-  }
-
-  /// Gives a ball a new list, and takes it out of and puts it into the others' accordingly.
-  /// @return false, and nothing changed, when some list has no room
-  bool replace(Slot slot, const std::vector<Slot>& neighbours) {
-    if (neighbours.size() > capacity()) return false;
-    newcomers_.clear();
-    for (const Slot other : neighbours) {
-      if (isAmong(other, begin(slot), count(slot))) continue;
-      if (count(other) == capacity()) return false;
-      newcomers_.push_back(other);
-    }
-    for (Slot* old = begin(slot); old != end(slot); ++old) {
-      if (!isAmong(*old, neighbours.data(), neighbours.size())) erase(*old, slot);
-    }
-    for (const Slot other : newcomers_) {
-      *end(other) = slot;
-      ++countOf(other);
-    }
-    return set(slot, neighbours);
-  }
-
-  /// Fetches a list from memory.
-  void prefetch(Slot slot) const { __builtin_prefetch(&entries_[slot * stride_]); }
-
-  std::size_t bytes() const {
-    return entries_.capacity() * sizeof(Slot) + homes_.capacity() * sizeof(CellCoordinates);
-  }
-
- private:
   Slot* begin(Slot slot) { return &entries_[slot * stride_ + 1]; }
   Slot* end(Slot slot) { return begin(slot) + count(slot); }
   Slot& countOf(Slot slot) { return entries_[slot * stride_]; }
 
-  // Lists are short: to look at all of one is faster than to guess where to stop.
-  static bool isAmong(Slot slot, const Slot* list, std::size_t count) {
-    bool found = false;
-    for (std::size_t i = 0; i < count; ++i) found |= list[i] == slot;
-    return found;
-  }
-
-  void erase(Slot from, Slot slot) {
-    Slot* const list = begin(from);
-    const Slot last = list[--countOf(from)];
-    for (std::size_t i = 0; i < count(from); ++i) list[i] = list[i] == slot ? last : list[i];
-  }
-
   std::size_t stride_ = 1;
   HugePageVector<Slot> entries_;  // a count and a list for each slot
-  HugePageVector<CellCoordinates> homes_;
-  std::vector<Slot> newcomers_;  // scratch
+  HugePageVector<Home> homes_;
+  Whole width_{};
+  Whole round_{};
+  Metres spacing_{};
+  float squared_reach_ = 0;
+  std::vector<Slot> near_;  // scratch of a new list
 };
 
 }  // namespace ball_sim::core
