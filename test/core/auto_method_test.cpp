@@ -12,6 +12,7 @@
 #include "ball_sim/fill.hpp"
 #include "ball_sim/observables.hpp"
 #include "ball_sim/world.hpp"
+#include "support/fills.hpp"
 #include "support/trial.hpp"
 
 namespace ball_sim::core {
@@ -59,18 +60,7 @@ class AutoRun {
   std::unique_ptr<AutoMethod> method_;
 };
 
-Scene gas(std::size_t count) {
-  Scene scene;
-  scene.surroundings.periodic = true;
-  Fill fill;
-  fill.count = count;
-  fill.radius = {0.1, 0.1};
-  fill.mass = Range{1, 1};
-  fill.speed_sigma = 1;
-  fill.packing_fraction = 0.2;
-  scene.fill = {fill};
-  return scene;
-}
+Scene gas(std::size_t count) { return periodicScene(fillOf(count, {0.1, 0.1}, 0.2)); }
 
 /// Balls in a column over a floor, the lowest on it.
 Scene stack(std::size_t count, double gap) {

@@ -4,9 +4,9 @@
 
 #include <cmath>
 
-#include "ball_sim/fill.hpp"
 #include "ball_sim/observables.hpp"
 #include "support/allocation_counter.hpp"
+#include "support/fills.hpp"
 #include "support/random_scenes.hpp"
 #include "support/trial.hpp"
 
@@ -25,18 +25,8 @@ MethodSettings withThreads(unsigned threads) {
 /// A closed box of equal balls at packing fraction 0.1.
 TestScene gas(std::size_t count, double largest_radius = 0.05) {
   Scene scene;
-  Fill fill;
-  fill.count = count;
-  fill.radius = {0.05, largest_radius};
-  fill.mass = Range{1, 1};
-  fill.speed_sigma = 1;
-  fill.seed = 3;
-  fill.packing_fraction = 0.1;
-  scene.fill = {fill};
-  TestScene result;
-  result.balls = populate(scene);
-  result.surroundings = scene.surroundings;
-  return result;
+  scene.fill = {fillOf(count, {0.05, largest_radius}, 0.1)};
+  return placed(scene);
 }
 
 std::uint64_t hashOf(const Trial& run) { return stateHash(run.states()); }

@@ -1,8 +1,8 @@
 // Method event_driven: no allocation once running, and how much memory a ball takes.
 #include <gtest/gtest.h>
 
-#include "ball_sim/fill.hpp"
 #include "support/allocation_counter.hpp"
+#include "support/fills.hpp"
 #include "support/trial.hpp"
 
 namespace ball_sim::core {
@@ -13,20 +13,7 @@ constexpr std::size_t kBalls = 1000;
 
 /// Equal balls in a periodic box.
 TestScene fluid(double packing_fraction) {
-  Scene scene;
-  Fill fill;
-  fill.count = kBalls;
-  fill.radius = {0.5, 0.5};
-  fill.mass = Range{1, 1};
-  fill.speed_sigma = 1;
-  fill.seed = 1;
-  fill.packing_fraction = packing_fraction;
-  scene.surroundings.periodic = true;
-  scene.fill = {fill};
-  TestScene result;
-  result.balls = populate(scene);
-  result.surroundings = scene.surroundings;
-  return result;
+  return placed(periodicScene(fillOf(kBalls, {0.5, 0.5}, packing_fraction)));
 }
 
 /// Balls that fall and bounce in a closed box.

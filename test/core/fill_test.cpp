@@ -9,6 +9,7 @@
 #include <random>
 
 #include "ball_sim/observables.hpp"
+#include "support/fills.hpp"
 
 namespace ball_sim::core {
 namespace {
@@ -16,15 +17,7 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
-Fill fillOf(std::size_t count, Range radius) {
-  Fill fill;
-  fill.count = count;
-  fill.radius = radius;
-  fill.mass = Range{1, 1};
-  fill.speed_sigma = 1;
-  fill.seed = 1;
-  return fill;
-}
+using test::fillOf;
 
 Scene cube(double edge, const Fill& fill) {
   Scene scene;

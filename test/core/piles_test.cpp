@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "ball_sim/fill.hpp"
+#include "support/fills.hpp"
 #include "support/trial.hpp"
 
 namespace ball_sim::core {
@@ -107,14 +107,8 @@ TestScene pour(std::size_t count, double side, double height, double restitution
   scene.surroundings = floorUnderGravity(kGravity, restitution);
   scene.surroundings.box.min = Vector3(0, 0, 0);
   scene.surroundings.box.max = Vector3(side, side, height);
-  Fill fill;
-  fill.count = count;
-  fill.radius = {kRadius, kRadius};
-  fill.mass = Range{1, 1};
-  fill.speed_sigma = 1;
-  fill.seed = 1;
-  scene.fill = {fill};
-  return {scene.surroundings, populate(scene)};
+  scene.fill = {fillOf(count, {kRadius, kRadius})};
+  return placed(scene);
 }
 
 /// Pours, and watches each second what moves and what energy there is.
