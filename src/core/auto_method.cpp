@@ -66,7 +66,7 @@ std::string AutoMethod::reason() const {
 
 // An exact method overlaps balls by rounding, or by what a stepping one left it.
 std::string AutoMethod::warning() const {
-  const std::string own = method_->warning();
+  std::string own = method_->warning();
   const double overlap = method_->statistics().deepest_overlap;
   const double limit = settings_.tolerance.value_or(kVisibleError) * numbers_.smallest_radius;
   if (stepping_ || !(overlap > std::max(limit, before_.deepest_overlap))) return own;

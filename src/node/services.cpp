@@ -179,7 +179,7 @@ bool Services::step(Step::Request& request, Step::Response& response) {
                 const std::int64_t before = simulator_.now();
                 const bool whole = simulator_.step(stepTarget(request), until);
                 const double seconds = static_cast<double>(simulator_.now() - before) / 1e9;
-                const std::string message = "ran " + core::formatNumber(seconds) + " s";
+                std::string message = "ran " + core::formatNumber(seconds) + " s";
                 if (whole) {
                   return message;
                 }

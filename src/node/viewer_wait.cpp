@@ -21,7 +21,8 @@ using Registry = XmlRpc::XmlRpcValue;
 /// The nodes that have what is called `name`.
 std::set<std::string> nodesOf(Registry& registry, const std::string& name) {
   std::set<std::string> nodes;
-  for (int i = 0; i < registry.size(); ++i) {
+  // By number: an XmlRpcValue's iterators are those of a map, which this is not.
+  for (int i = 0; i < registry.size(); ++i) {  // NOLINT(modernize-loop-convert)
     if (static_cast<std::string&>(registry[i][0]) != name) {
       continue;
     }
