@@ -449,16 +449,20 @@ class CellGrid {
     }
   }
 
-  /// Moves a ball to an adjacent cell of its level.
-  void move(Slot slot, const CellCoordinates& from, const CellCoordinates& to, std::size_t level) {
-    levels_[level].unlink(slot, levels_[level].cellIndex(from));
-    levels_[level].link(slot, levels_[level].cellIndex(to));
+  /// Moves a ball to the adjacent cell of its level along `axis`.
+  void move(Slot slot, const CellCoordinates& from, const CellCoordinates& to, std::size_t axis,
+            std::size_t level) {
+    CellLevel& own = levels_[level];
+    const std::uint32_t before = own.cellIndex(from);
+    own.unlink(slot, before);
+    own.link(slot, before - own.neighbours(axis, from[axis]).cell[1] +
+                       own.neighbours(axis, to[axis]).cell[1]);
     for (std::size_t m = 0; m < level; ++m) {
-      const std::uint32_t before = levels_[m].cellIndex(inLevel(from, level, m));
-      const std::uint32_t after = levels_[m].cellIndex(inLevel(to, level, m));
-      if (before == after) continue;
-      levels_[m].unlinkGuest(slot, before);
-      levels_[m].linkGuest(slot, after);
+      const std::uint32_t was_in = levels_[m].cellIndex(inLevel(from, level, m));
+      const std::uint32_t is_in = levels_[m].cellIndex(inLevel(to, level, m));
+      if (was_in == is_in) continue;
+      levels_[m].unlinkGuest(slot, was_in);
+      levels_[m].linkGuest(slot, is_in);
     }
   }
 

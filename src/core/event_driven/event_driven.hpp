@@ -360,7 +360,7 @@ class EventDriven final : public Method {
   // From a to the image of b that it meets: the nearest, but where the box is so small that several
   // are in reach, the one it approaches fastest.
   Vec contactVector(const Body<Real>& a, const Body<Real>& b, Real reach) const {
-    const Vec nearest = nearestImage(b.x - a.x);
+    Vec nearest = nearestImage(b.x - a.x);
     if (images_.empty()) return nearest;
     Vec best = nearest;
     Real fastest = -kNever<Real>;
@@ -651,7 +651,7 @@ class EventDriven final : public Method {
     agenda.cell[agenda.crossing_axis] += agenda.crossing_direction;
     const CellCoordinates unwrapped = agenda.cell;
     wrapCrossing(slot);
-    grid_.move(slot, before, agenda.cell, agenda.level);
+    grid_.move(slot, before, agenda.cell, agenda.crossing_axis, agenda.level);
     if (!images_.empty()) return search(slot);  // other images are in reach now, too
     Found found{agenda.impact_time, agenda.partner};
     grid_.gatherNewLayer(before, unwrapped, agenda.cell, agenda.level, agenda.crossing_axis,
@@ -1067,7 +1067,10 @@ class EventDriven final : public Method {
 
   // Box faces are only met from the cells beside them; planes from anywhere.
   void considerWallsOf(Slot slot, Found& found) const {
-    if (walls_.empty() || isFixed(slot)) return;
+    if (!walls_.empty() && !isFixed(slot)) considerWalls(slot, found);
+  }
+
+  void considerWalls(Slot slot, Found& found) const {
     if (listed_) {
       for (std::uint32_t wall = 0; wall < walls_.size(); ++wall) considerWall(slot, wall, found);
       return;

@@ -5,8 +5,10 @@
 // and in the event queue eight are mostly all there are.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <numeric>
 #include <vector>
 
 #if defined(__SSE2__)
@@ -77,7 +79,6 @@ class Tournament {
     const std::uint32_t place = takePlace();
     slots_[place] = slot;
     levels_[0].times[place] = time;
-    levels_[0].winners[place] = place;
     ++count_;
     replay(place);
     return place;
@@ -102,6 +103,7 @@ class Tournament {
     used_ = 0;
     free_places_.clear();
     top_ = 0;
+    capacity_ = kGroup;
     makeRoom();
   }
 
@@ -120,16 +122,14 @@ class Tournament {
     std::vector<std::uint32_t> winners;  // whose these are, by place
   };
 
-  std::size_t capacity() const { return kGroup << (kGroupBits * top_); }
-
   void makeRoom() {
-    if (slots_.size() >= capacity()) return;
-    slots_.resize(capacity());
-    if (levels_.size() <= top_) levels_.resize(top_ + 1);
+    if (slots_.size() >= capacity_) return;
+    slots_.resize(capacity_);
     for (std::size_t level = 0; level <= top_; ++level) {
-      levels_[level].times.resize(capacity() >> (kGroupBits * level), kNever<Real>);
+      levels_[level].times.resize(capacity_ >> (kGroupBits * level), kNever<Real>);
       levels_[level].winners.resize(levels_[level].times.size());
     }
+    std::iota(levels_[0].winners.begin(), levels_[0].winners.end(), 0U);
   }
 
   std::uint32_t takePlace() {
@@ -138,8 +138,9 @@ class Tournament {
       free_places_.pop_back();
       return place;
     }
-    if (used_ == capacity()) {
+    if (used_ == capacity_) {
       ++top_;
+      capacity_ *= kGroup;
       makeRoom();
       replay(0);  // the group that was the top one
     }
@@ -150,7 +151,7 @@ class Tournament {
   void replay(std::uint32_t place) {
     std::uint32_t group = place;
     for (std::size_t level = 0; level < top_; ++level) {
-      group /= kGroup;
+      group >>= kGroupBits;
       const std::uint32_t winner = winnerOf(level, group);
       levels_[level + 1].winners[group] = winner;
       levels_[level + 1].times[group] = levels_[0].times[winner];
@@ -162,8 +163,7 @@ class Tournament {
     const auto least = leastOfGroup(&levels_[level].times[group * kGroup]);
     unsigned holders = least.holders;
     std::uint32_t winner = winners[__builtin_ctz(holders)];
-    if (least.time == kNever<Real>) return winner;
-    while ((holders &= holders - 1) != 0) {  // seldom
+    while ((holders &= holders - 1) != 0 && least.time < kNever<Real>) {  // seldom
       const std::uint32_t other = winners[__builtin_ctz(holders)];
       if (before_(slots_[other], slots_[winner])) winner = other;
     }
@@ -171,9 +171,10 @@ class Tournament {
   }
 
   Before before_;
-  std::vector<Level> levels_;  // lowest first
-  std::size_t top_ = 0;        // the level of a single group
-  std::vector<Slot> slots_;    // by place
+  std::array<Level, 9> levels_;  // lowest first; enough for 2^27 balls
+  std::size_t top_ = 0;          // the level of a single group
+  std::size_t capacity_ = 0;     // places up to there
+  std::vector<Slot> slots_;      // by place
   std::vector<std::uint32_t> free_places_;
   std::uint32_t used_ = 0;  // places that were ever taken
   std::size_t count_ = 0;   // balls in it
