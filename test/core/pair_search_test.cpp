@@ -115,7 +115,7 @@ TEST(PairSearch, EveryInstructionSetFindsWhatThePairsTell) {
   for (const bool wraps : {false, true}) {
     for (const bool falls : {false, true}) {
       const auto searches = pairSearches<double>(wraps, falls);
-      ASSERT_EQ(choosePairSearch<double>(wraps, falls), searches.front());
+      ASSERT_EQ(choosePairSearch<double>(wraps, falls, kSearchStep), searches.front());
       for (std::size_t k = 0; k < searches.size(); ++k) {
         SCOPED_TRACE(testing::Message() << "wraps " << wraps << ", falls " << falls << ", kind "
                                         << k << " of " << searches.size());

@@ -462,7 +462,8 @@ class EventDriven final : public Method {
         images_.push_back(shift);
       }
     }
-    search_pairs_ = choosePairSearch<Real>(surroundings_.periodic && nearest, kGravity);
+    search_pairs_ = choosePairSearch<Real>(surroundings_.periodic && nearest, kGravity,
+                                           listed_ ? kSearchStep : kLanesForFew);
   }
 
   // Gives the balls new slots along a space-filling curve, so that neighbours in space are

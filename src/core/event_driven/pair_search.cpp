@@ -221,13 +221,15 @@ struct Lanes {
 #endif
 
 template <>
-std::vector<PairSearch<double>> pairSearches<double>(bool wraps, bool falls) {
+std::vector<PairSearch<double>> pairSearches<double>(bool wraps, bool falls,
+                                                     std::size_t most_lanes) {
   std::vector<PairSearch<double>> searches;
 #ifdef BALL_SIM_X86_LANES
-  if (__builtin_cpu_supports("avx512f")) {
+  if (most_lanes >= 8 && __builtin_cpu_supports("avx512f")) {
     searches.push_back(eight_lanes::pairSearch(wraps, falls));
   }
-  if (__builtin_cpu_supports("avx2")) searches.push_back(four_lanes::pairSearch(wraps, falls));
+  if (most_lanes >= 4 && __builtin_cpu_supports("avx2"))
+    searches.push_back(four_lanes::pairSearch(wraps, falls));
   searches.push_back(two_lanes::pairSearch(wraps, falls));
 #endif
   searches.push_back(one_lane::of_double::pairSearch(wraps, falls));
@@ -235,16 +237,17 @@ std::vector<PairSearch<double>> pairSearches<double>(bool wraps, bool falls) {
 }
 
 template <>
-std::vector<PairSearch<long double>> pairSearches<long double>(bool wraps, bool falls) {
+std::vector<PairSearch<long double>> pairSearches<long double>(bool wraps, bool falls,
+                                                               std::size_t) {
   return {one_lane::of_long_double::pairSearch(wraps, falls)};
 }
 
 template <class Real>
-PairSearch<Real> choosePairSearch(bool wraps, bool falls) {
-  return pairSearches<Real>(wraps, falls).front();
+PairSearch<Real> choosePairSearch(bool wraps, bool falls, std::size_t most_lanes) {
+  return pairSearches<Real>(wraps, falls, most_lanes).front();
 }
 
-template PairSearch<double> choosePairSearch<double>(bool wraps, bool falls);
-template PairSearch<long double> choosePairSearch<long double>(bool wraps, bool falls);
+template PairSearch<double> choosePairSearch<double>(bool wraps, bool falls, std::size_t);
+template PairSearch<long double> choosePairSearch<long double>(bool wraps, bool falls, std::size_t);
 
 }  // namespace ball_sim::core

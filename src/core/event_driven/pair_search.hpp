@@ -75,14 +75,19 @@ template <class Real>
 using PairSearch = PairHit<Real> (*)(const Body<Real>* bodies, const Slot* slots, std::size_t count,
                                      const Seeker<Real>& seeker, const PairSpace<Real>& space);
 
-/// The search in the widest instructions that this processor has.
+/// Wider than this is slower where lists are as short as a layer of cells: the lanes stay empty,
+/// and wide roots and quotients take longer.
+constexpr std::size_t kLanesForFew = 4;
+
+/// The search in the widest instructions that this processor has, of at most so many lanes.
 /// @param wraps  take the nearest image on the axes that have a period
 /// @param falls  the balls fall by space.fall; without it no fall is computed
 template <class Real>
-PairSearch<Real> choosePairSearch(bool wraps, bool falls);
+PairSearch<Real> choosePairSearch(bool wraps, bool falls, std::size_t most_lanes);
 
 /// The same search in every kind of instructions that this processor has, the widest first.
 template <class Real>
-std::vector<PairSearch<Real>> pairSearches(bool wraps, bool falls);
+std::vector<PairSearch<Real>> pairSearches(bool wraps, bool falls,
+                                           std::size_t most_lanes = kSearchStep);
 
 }  // namespace ball_sim::core
