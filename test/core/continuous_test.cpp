@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <utility>
+#include <vector>
 
 #include "ball_sim/observables.hpp"
 #include "support/allocation_counter.hpp"
@@ -22,10 +24,10 @@ MethodSettings withThreads(unsigned threads) {
   return settings;
 }
 
-/// A closed box of equal balls at packing fraction 0.1.
-TestScene gas(std::size_t count, double largest_radius = 0.05) {
+/// Balls of 1 kg in a closed box.
+TestScene gas(std::size_t count, double largest_radius = 0.05, double packing_fraction = 0.1) {
   Scene scene;
-  scene.fill = {fillOf(count, {0.05, largest_radius}, 0.1)};
+  scene.fill = {fillOf(count, {0.05, largest_radius}, packing_fraction)};
   return placed(scene);
 }
 
@@ -45,17 +47,80 @@ void expectSameCollisions(const Trial& a, const Trial& b) {
 }
 
 TEST(Continuous, sameBitsForAnyNumberOfThreads) {
-  const TestScene scene = gas(4000);  // enough for the threads to be woken
+  const TestScene scene = gas(15000);  // enough for the threads to be woken, for plans too
   Trial alone(kMethod, scene, withThreads(1));
-  alone.advanceTo(0.5);
+  alone.advanceTo(0.2);
   ASSERT_GT(alone.collisions().size(), 10000u);
   for (const unsigned threads : {2u, 3u}) {
     Trial together(kMethod, scene, withThreads(threads));
-    together.advanceTo(0.5);
+    together.advanceTo(0.2);
     EXPECT_EQ(hashOf(together), hashOf(alone)) << threads;
     EXPECT_EQ(together.method().statistics().virial, alone.method().statistics().virial);
     expectSameCollisions(together, alone);
   }
+}
+
+/// Gases in which impacts of a slice often have to do with each other, and in which they hold what
+/// a plan has to know: walls, images, falls, histories, sizes.
+std::vector<std::pair<const char*, TestScene>> plannedScenes() {
+  std::vector<std::pair<const char*, TestScene>> scenes;
+  scenes.emplace_back("dilute", gas(2000));
+  scenes.emplace_back("dense", gas(1500, 0.05, 0.4));
+  scenes.emplace_back("sizes", gas(1500, 0.2));
+  scenes.emplace_back("periodic", gas(2000, 0.05, 0.2));
+  scenes.back().second.surroundings.periodic = true;
+  scenes.emplace_back("falling", gas(1500, 0.05, 0.2));
+  scenes.back().second.surroundings.gravity = Vector3(1, 0, -9);
+  scenes.back().second.surroundings.restitution = 0.9;
+  for (std::size_t i = 0; i < 1500; i += 50) {
+    Ball& ball = scenes.back().second.balls[i];
+    ball.velocity = Vector3::Zero();
+    ball.mass = kFixed;
+  }
+  return scenes;
+}
+
+// A slice with more impacts than may be taken is not planned: what is planned against what is taken
+// in turn. With some more allowed, plans are interrupted.
+TEST(Continuous, sameBitsWhetherPlannedOrInTurn) {
+  for (const auto& [name, scene] : plannedScenes()) {
+    SCOPED_TRACE(name);
+    const Time end = Time::fromSeconds(0.1);
+    Trial in_turn(kMethod, scene);
+    while (!in_turn.method().advanceTo(end, 1)) {
+    }
+    ASSERT_GT(in_turn.collisions().size(), scene.balls.size() / 4);
+    Trial planned(kMethod, scene);
+    planned.method().advanceTo(end);
+    Trial interrupted(kMethod, scene);
+    RandomNumbers random(10);
+    while (!interrupted.method().advanceTo(end, 30 + random.index(30))) {
+      // As far as it has come all is as it should be.
+      EXPECT_LT(interrupted.method().statistics().deepest_overlap, 1e-13);
+    }
+    for (const Trial* other : {&planned, &interrupted}) {
+      EXPECT_EQ(hashOf(*other), hashOf(in_turn));
+      expectSameCollisions(*other, in_turn);
+      EXPECT_EQ(other->method().statistics().events, in_turn.method().statistics().events);
+    }
+    if (HasFailure()) return;
+  }
+}
+
+// What is read when plans are interrupted is the state of that instant.
+TEST(Continuous, isWhereItSaysWhenInterrupted) {
+  const TestScene scene = gas(1500, 0.05, 0.3);
+  Trial interrupted(kMethod, scene);
+  Trial straight(kMethod, scene);
+  RandomNumbers random(11);
+  const Time end = Time::fromSeconds(0.05);
+  int stops = 0;
+  while (!interrupted.method().advanceTo(end, 20 + random.index(30))) {
+    straight.method().advanceTo(interrupted.method().now());
+    ASSERT_EQ(hashOf(interrupted), hashOf(straight)) << stops;
+    ++stops;
+  }
+  EXPECT_GT(stops, 20);
 }
 
 // Of every kind of scene: steps of any length, and stops at any number of impacts.

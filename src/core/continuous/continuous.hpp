@@ -3,9 +3,16 @@
 //
 // At the start of a frame all balls are put into a grid by place, and all pairs whose paths over
 // the frame come near enough are found in one pass through memory (swept_grid.hpp), which the
-// threads share. The few impacts inside the frame are taken in order of time; after each its
+// threads share. The impacts inside the frame are taken slice of time by slice; after each its
 // partners are searched anew for the rest of the frame. No queue outlives the frame, and nothing
 // happens when a ball passes from cell to cell.
+//
+// The impacts of a short slice hardly have to do with each other. Those whose balls have no other
+// one are planned: what each leads to is computed without changing anything, in the order of the
+// grid, and shared by the threads. A plan holds unless a path that it leads to meets another within
+// the slice, be it one of now or one that is planned too. What does not hold, and what shares
+// balls, is taken in order of time; what happens there may end more plans, which have changed
+// nothing so far. At the end of the slice the plans that are left come true.
 //
 // The result is that of event-driven dynamics, to the last bit independent of frames, grid, threads
 // and of when advanceTo() was called: a ball's place is stored at its own last change and nowhere
@@ -59,7 +66,7 @@ class Continuous final : public Method {
         grid_(axesOf(surroundings)),
         pool_(threads),
         alone_(1),
-        finders_(threads) {
+        workers_(threads) {
     for (int axis = 0; axis < 3; ++axis) {
       if (!surroundings.periodic || (axis == 2 && surroundings.planar())) continue;
       period_[axis] = Real(surroundings.box.max[axis]) - Real(surroundings.box.min[axis]);
@@ -182,12 +189,17 @@ class Continuous final : public Method {
 
   Statistics statistics() const override {
     Statistics statistics = statistics_;
-    statistics.queue_depth = agenda_.size() - next_ + later_.size();
+    statistics.queue_depth = pending_.size();
     statistics.bytes = grid_.bytes() + capacityBytes(bodies_) + capacityBytes(cards_) +
                        capacityBytes(accelerations_) + capacityBytes(resting_) +
                        capacityBytes(wall_visits_) + capacityBytes(slots_) +
-                       capacityBytes(positions_) + capacityBytes(agenda_) + capacityBytes(later_);
-    for (const Finder& finder : finders_) statistics.bytes += capacityBytes(finder.found);
+                       capacityBytes(positions_) + capacityBytes(pending_) + capacityBytes(slice_) +
+                       capacityBytes(waiting_) + capacityBytes(lone_) + capacityBytes(plans_) +
+                       capacityBytes(plan_of_) + capacityBytes(in_turn_) + capacityBytes(happened_);
+    for (const Worker& worker : workers_) {
+      statistics.bytes += capacityBytes(worker.pairs) + capacityBytes(worker.found) +
+                          capacityBytes(worker.disturbed) + worker.moved.capacity() / 8;
+    }
     return statistics;
   }
 
@@ -209,7 +221,7 @@ class Continuous final : public Method {
     ImpactHistory<Real> history;   // on the clock of this era
     BallId id = 0;
     BallId met = kNobody;       // the partner of that impact, when no change came after it
-    std::uint32_t version = 0;  // counts the changes of this ball's path
+    std::uint32_t version = 0;  // another one after each change of this ball's path
   };
 
   // When a ball, left to itself, meets a wall.
@@ -226,10 +238,51 @@ class Continuous final : public Method {
     std::array<std::int16_t, 3> image;  // b is met so many periods from where its body says
   };
 
-  // What one thread needs to search.
-  struct alignas(64) Finder {
+  // A ball after an impact.
+  struct Side {
+    Body body;
+    ImpactHistory<Real> history;
+    WallVisit wall;  // its next
+  };
+
+  // What an impact of two balls leads to.
+  struct Plan {
+    enum class State { open, leads_too_far, dropped, came_true };
+
+    Impact impact;              // a has the smaller id
+    std::array<Side, 2> sides;  // of a and b
+    BallImpact<Real> passed;
+    std::uint32_t version = 0;  // of both balls' paths, once it comes true
+    State state = State::open;
+  };
+
+  // The way that a ball goes on now, or would by a plan.
+  struct Path {
+    Slot slot;
+    const Body* body;
+    const Plan* plan = nullptr;  // nullptr: now
+  };
+
+  // An impact for the log.
+  struct Reported {
+    Impact impact;
+    Collision collision;
+  };
+
+  // Two balls that may meet.
+  struct Pair {
+    Slot slot;
+    std::uint32_t other;       // its position in the grid, from meetPairs() on its slot
+    std::array<int, 3> turns;  // of the image that was found; 0 where only one is near
+  };
+
+  // What one thread needs.
+  struct alignas(64) Worker {
     SweptSearch search;
-    std::vector<Impact> found;
+    std::vector<Pair> pairs;               // found, and not looked at yet
+    std::vector<Impact> found;             // after the slice
+    std::vector<std::uint32_t> disturbed;  // plans that do not hold
+    std::vector<bool> moved;               // by slot
   };
 
   static constexpr BallId kNobody = ~BallId{0};
@@ -238,8 +291,14 @@ class Continuous final : public Method {
   static constexpr std::uint32_t kFramesPerRenumbering = 4;
   static constexpr std::size_t kFewBalls = 2000;  // not worth waking threads for
   static constexpr int kErasToSettle = 16;
-  static constexpr std::size_t kSoon = 12;  // impacts ahead
-  static constexpr std::size_t kSooner = 6;
+  static constexpr std::size_t kBatch = 64;  // searches whose memory is asked for at once
+  // Longer slices: more impacts share balls. Shorter: less is near in memory. A flat optimum.
+  static constexpr double kImpactsPerBallAndSlice = 0.015;
+  static constexpr std::size_t kFewImpacts = 8;  // not worth planning
+  static constexpr std::size_t kFewPlans = 200;  // not worth waking threads for
+  static constexpr std::uint32_t kNoPlan = 0xFFFFFFFF;
+  static constexpr std::uint32_t kOnePlan = 0xFFFFFFFE;
+  static constexpr std::uint32_t kManyPlans = 0xFFFFFFFD;
 
   template <class Vector>
   static std::size_t capacityBytes(const Vector& v) {
@@ -294,17 +353,40 @@ class Continuous final : public Method {
     return Vec::Zero();
   }
 
-  Vec positionAt(Slot slot, Real time) const {
-    const Body& body = bodies_[slot];
+  Vec positionAt(Slot slot, Real time) const { return placeAt(pathOf(slot), time); }
+  Vec velocityAt(Slot slot, Real time) const { return speedAt(pathOf(slot), time); }
+
+  Path pathOf(Slot slot) const { return {slot, &bodies_[slot]}; }
+
+  Vec placeAt(const Path& path, Real time) const {
+    const Body& body = *path.body;
     const Real dt = time - body.time;
-    if constexpr (kGravity) return body.x + dt * (body.v + (dt / 2) * accelerations_[slot]);
+    if constexpr (kGravity) return body.x + dt * (body.v + (dt / 2) * accelerations_[path.slot]);
     return body.x + dt * body.v;
   }
 
-  Vec velocityAt(Slot slot, Real time) const {
-    const Body& body = bodies_[slot];
-    if constexpr (kGravity) return body.v + (time - body.time) * accelerations_[slot];
+  Vec speedAt(const Path& path, Real time) const {
+    const Body& body = *path.body;
+    if constexpr (kGravity) return body.v + (time - body.time) * accelerations_[path.slot];
     return body.v;
+  }
+
+  static Side& sideOf(Plan& plan, Slot slot) { return plan.sides[slot == plan.impact.a ? 0 : 1]; }
+  static const Side& sideOf(const Plan& plan, Slot slot) {
+    return plan.sides[slot == plan.impact.a ? 0 : 1];
+  }
+
+  static Slot partnerOf(const Path& path) {
+    const Impact& impact = path.plan->impact;
+    return path.slot == impact.a ? impact.b : impact.a;
+  }
+
+  BallId metBy(const Path& path) const {
+    return path.plan != nullptr ? cards_[partnerOf(path)].id : cards_[path.slot].met;
+  }
+
+  std::uint32_t versionOf(const Path& path) const {
+    return path.plan != nullptr ? path.plan->version : cards_[path.slot].version;
   }
 
   // Stores the place of now, for a change of velocity to start from.
@@ -436,12 +518,13 @@ class Continuous final : public Method {
       layOut();
       fillGrid(limit, pool);
     }
-    if (++frames_since_renumbering_ >= kFramesPerRenumbering) renumber();
+    if (++frames_since_renumbering_ >= kFramesPerRenumbering) renumber(pool);
     positions_.resize(bodies_.size());
     for (std::size_t p = 0; p < bodies_.size(); ++p) {
       positions_[grid_.slotAt(p)] = static_cast<std::uint32_t>(p);
     }
     findImpacts(pool);
+    impacts_in_frame_ = pending_.size();
     frame_open_ = true;
   }
 
@@ -455,19 +538,26 @@ class Continuous final : public Method {
     grid_.fill(
         bodies_.size(), [this](std::size_t i) { return sweptBallAtHome(static_cast<Slot>(i)); },
         pool);
+    // Two paths that meet lie within four reaches, and a nearest image is nearer than half a
+    // period.
+    const Real near = Real(8 * grid_.reach());
+    one_image_is_near_ = true;
+    for (int k = 0; k < 3; ++k) {
+      if (period_[k] > 0 && !(near < period_[k])) one_image_is_near_ = false;
+    }
   }
 
   // A ball's path from its last change in this frame to the end of the frame.
-  SweptBall sweptBall(Slot slot) const {
+  SweptBall sweptBall(const Path& path) const {
     using std::sqrt;
-    const Real begin = std::max(bodies_[slot].time, frame_start_);
+    const Real begin = std::max(path.body->time, frame_start_);
     const Real length = std::max(frame_end_ - begin, Real(0));
-    const Vec x = positionAt(slot, begin);
-    Vec half = (length / 2) * velocityAt(slot, begin);
+    const Vec x = placeAt(path, begin);
+    Vec half = (length / 2) * speedAt(path, begin);
     SweptBall ball;
-    ball.radius = double(bodies_[slot].radius);
+    ball.radius = double(path.body->radius);
     if constexpr (kGravity) {
-      const Vec& a = accelerations_[slot];
+      const Vec& a = accelerations_[path.slot];
       half += (length * length / 4) * a;
       ball.radius += double(length * length / 8 * sqrt(dot(a, a)));  // the bulge of the parabola
     }
@@ -482,7 +572,7 @@ class Continuous final : public Method {
 
   // The same, with its middle in the periodic box.
   SweptBall sweptBallAtHome(Slot slot) const {
-    SweptBall ball = sweptBall(slot);
+    SweptBall ball = sweptBall(pathOf(slot));
     if (surroundings_.periodic) {
       const Vec middle(Real(ball.middle[0]), Real(ball.middle[1]), Real(ball.middle[2]));
       const Vec home = wrapped(middle);
@@ -492,10 +582,10 @@ class Continuous final : public Method {
   }
 
   // The same, in the image that the grid has taken the ball to until now.
-  SweptBall sweptBallInGrid(Slot slot) const {
-    SweptBall ball = sweptBall(slot);
+  SweptBall sweptBallInGrid(const Path& path) const {
+    SweptBall ball = sweptBall(path);
     if (surroundings_.periodic) {
-      const std::array<int, 3> turns = turnsInGrid(ball, positions_[slot]);
+      const std::array<int, 3> turns = turnsInGrid(ball, positions_[path.slot]);
       for (std::size_t k = 0; k < 3; ++k) {
         ball.middle[k] += turns[k] * double(period_[static_cast<int>(k)]);
       }
@@ -545,135 +635,200 @@ class Continuous final : public Method {
 
   // Gives the balls new slots in the grid's order, so that neighbours in space are neighbours in
   // memory.
-  void renumber() {
+  void renumber(WorkerPool& pool) {
     frames_since_renumbering_ = 0;
     positions_.resize(bodies_.size());
     for (std::size_t p = 0; p < bodies_.size(); ++p) {
       positions_[grid_.slotAt(p)] = static_cast<std::uint32_t>(p);
     }
     for (Slot& slot : slots_) slot = positions_[slot];
-    // Cycle by cycle: what is at i belongs at positions_[i].
-    for (Slot i = 0; i < positions_.size(); ++i) {
-      while (positions_[i] != i) {
-        const Slot to = positions_[i];
-        forEachArray([&](auto& values) { std::swap(values[i], values[to]); });
-        std::swap(positions_[i], positions_[to]);
-      }
-    }
+    pool.run([&](unsigned w) {
+      unsigned array = 0;
+      forEachArray([&](auto& values) {
+        if (array++ % pool.size() == w) moveToPositions(values, workers_[w].moved);
+      });
+    });
     grid_.renumber();
   }
 
-  void findImpacts(WorkerPool& pool) {
-    agenda_.clear();
-    later_.clear();
-    next_ = 0;
-    const std::size_t count = bodies_.size();
-    pool.run([&](unsigned worker) {
-      Finder& finder = finders_[worker];
-      finder.found.clear();
-      finder.search.ahead_of = SweptSearch::kNoCell;  // of another frame
-      findImpactsOf(count * worker / pool.size(), count * (worker + 1) / pool.size(), finder.search,
-                    worker == 0 ? agenda_ : finder.found);
-    });
-    for (unsigned worker = 1; worker < pool.size(); ++worker) {
-      const std::vector<Impact>& found = finders_[worker].found;
-      agenda_.insert(agenda_.end(), found.begin(), found.end());
+  // Cycle by cycle: what is at i belongs at positions_[i].
+  template <class Values>
+  void moveToPositions(Values& values, std::vector<bool>& moved) const {
+    moved.assign(values.size(), false);
+    for (Slot i = 0; i < values.size(); ++i) {
+      if (moved[i]) continue;
+      auto carried = values[i];
+      Slot to = i;
+      do {
+        to = positions_[to];
+        std::swap(carried, values[to]);
+        moved[to] = true;
+      } while (to != i);
     }
-    std::sort(agenda_.begin(), agenda_.end(), before());
+  }
+
+  void findImpacts(WorkerPool& pool) {
+    pending_.clear();
+    share(pool, bodies_.size(), [this](std::size_t begin, std::size_t end, Worker& worker) {
+      worker.search.ahead_of = SweptSearch::kNoCell;  // of another frame
+      findImpactsOf(begin, end, worker);
+    });
+    collectFound();
+  }
+
+  // Shares the work on 0..count-1 among threads, in order: f(begin, end, worker).
+  template <class Function>
+  void share(WorkerPool& pool, std::size_t count, const Function& f) {
+    pool.run([&](unsigned w) {
+      f(count * w / pool.size(), count * (w + 1) / pool.size(), workers_[w]);
+    });
   }
 
   // All impacts in this frame of the balls at some positions of the grid, each pair's from one of
   // its ends.
-  void findImpactsOf(std::size_t begin, std::size_t end, SweptSearch& search,
-                     std::vector<Impact>& found) const {
-    for (std::size_t p = begin; p < end; ++p) {
-      const Slot slot = grid_.slotAt(p);
-      considerWall(slot, found);
-      const std::size_t level = grid_.levelAt(p);
-      grid_.findAhead(p, level, search);
-      considerHits(slot, search, found);
-      for (std::size_t other = 0; other < grid_.levels(); ++other) {
-        if (!grid_.seeks(level, other)) continue;
-        grid_.findAround(other, sweptBallInGrid(slot), search);
-        considerHits(slot, search, found);
-      }
+  void findImpactsOf(std::size_t begin, std::size_t end, Worker& worker) const {
+    inBatches(begin, end, [&](std::size_t first, std::size_t last) {
+      for (std::size_t p = first; p < last; ++p) searchAhead(p, worker);
+      meetPairs(worker);
+      considerPairs(worker);
+    });
+  }
+
+  void searchAhead(std::size_t p, Worker& worker) const {
+    const Path path = pathOf(grid_.slotAt(p));
+    considerWall(path, worker.found);
+    const std::size_t level = grid_.levelAt(p);
+    grid_.findAhead(p, level, worker.search);
+    noteHits(path.slot, worker);
+    for (std::size_t other = 0; other < grid_.levels(); ++other) {
+      if (!grid_.seeks(level, other)) continue;
+      grid_.findAround(other, sweptBallInGrid(path), worker.search);
+      noteHits(path.slot, worker);
     }
   }
 
-  void considerHits(Slot slot, const SweptSearch& search, std::vector<Impact>& found) const {
-    for (std::size_t i = 0; i < search.count; ++i) {
-      const LaneHit& hit = search.hits[i];
-      Impact impact;
-      impact.a = slot;
-      impact.b = grid_.slotAt(hit.lane);
-      if (impact.b == slot) continue;
-      impact.image = {0, 0, 0};
-      if (surroundings_.periodic) impact.image = imageOf(impact, hit, search);
-      impact.time = timeOf(impact);
-      if (!(impact.time <= frame_end_)) continue;
-      impact.version_a = cards_[slot].version;
-      impact.version_b = cards_[impact.b].version;
-      found.push_back(impact);
+  // Notes where a search has found others, and asks memory who they are.
+  void noteHits(Slot slot, Worker& worker) const {
+    for (std::size_t i = 0; i < worker.search.count; ++i) {
+      const LaneHit& hit = worker.search.hits[i];
+      grid_.fetchSlot(hit.lane);
+      worker.pairs.push_back({slot, hit.lane, {0, 0, 0}});
+      if (!one_image_is_near_) worker.pairs.back().turns = grid_.imageOf(hit, worker.search);
     }
+  }
+
+  // Learns who they are, and asks memory for what they are.
+  void meetPairs(Worker& worker) const {
+    std::size_t kept = 0;
+    for (Pair& pair : worker.pairs) {
+      pair.other = grid_.slotAt(pair.other);
+      if (pair.other == pair.slot) continue;
+      touch(&bodies_[pair.other]);
+      if (plans_left_ > 0) touch(&plan_of_[pair.other]);
+      worker.pairs[kept++] = pair;
+    }
+    worker.pairs.resize(kept);
+  }
+
+  // The impacts of pairs as they are now.
+  void considerPairs(Worker& worker) const {
+    for (const Pair& pair : worker.pairs) {
+      const Impact impact = meeting(pathOf(pair.slot), pathOf(pair.other), pair.turns);
+      if (impact.time <= frame_end_) worker.found.push_back(impact);
+    }
+    worker.pairs.clear();
+  }
+
+  // What the workers have found is pending now.
+  void collectFound() {
+    for (Worker& worker : workers_) {
+      pending_.insert(pending_.end(), worker.found.begin(), worker.found.end());
+      worker.found.clear();
+    }
+  }
+
+  // The impact of two balls on their paths, if neither changes before; its time is computed from
+  // what they have stored alone, so that it is the same bits whenever it is asked.
+  // @param turns  periods from where the grid has b to the image that was found
+  Impact meeting(const Path& a, const Path& b, const std::array<int, 3>& turns) const {
+    Impact impact;
+    impact.a = a.slot;
+    impact.b = b.slot;
+    impact.image = {0, 0, 0};
+    const Real start = std::max(a.body->time, b.body->time);
+    Vec dx = placeAt(b, start) - placeAt(a, start);
+    Vec dv = b.body->v - a.body->v;
+    Vec da = Vec::Zero();
+    if constexpr (kGravity) {
+      dv = speedAt(b, start) - speedAt(a, start);
+      da = accelerations_[b.slot] - accelerations_[a.slot];
+    }
+    if (surroundings_.periodic) {
+      const Real later = std::max(frame_start_ - start, Real(0));
+      impact.image = one_image_is_near_ ? nearestTurns(dx + later * dv + (later * later / 2) * da)
+                                        : turnsBetween(a, b, turns);
+      dx += shiftOf(impact.image);
+    }
+    const Real reach = a.body->radius + b.body->radius;
+    if (kGravity && dot(da, da) > 0) {
+      impact.time = start + timeOfImpactAccelerated<Real>(dx, dv, da, reach);
+    } else {
+      const Real wait = timeOfImpact<Real>(dx, dv, reach);
+      const bool again = wait < kNever<Real> && haveJustMet(a, b, dx, reach);
+      impact.time = again ? kNever<Real> : start + wait;
+    }
+    if (impact.time <= frame_end_) {
+      impact.version_a = versionOf(a);
+      impact.version_b = versionOf(b);
+    }
+    return impact;
+  }
+
+  // So many periods bring the nearest image of a ball to another, which lies at -dx.
+  std::array<std::int16_t, 3> nearestTurns(const Vec& dx) const {
+    using std::floor;
+    std::array<std::int16_t, 3> turns = {0, 0, 0};
+    for (int k = 0; k < 3; ++k) {
+      if (!(period_[k] > 0)) continue;
+      turns[static_cast<std::size_t>(k)] =
+          static_cast<std::int16_t>(-floor(dx[k] / period_[k] + Real(0.5)));
+    }
+    return turns;
   }
 
   // The grid has found a pair in some image: which one is it of the places stored?
-  std::array<std::int16_t, 3> imageOf(const Impact& impact, const LaneHit& hit,
-                                      const SweptSearch& search) const {
-    const std::array<int, 3> seen = grid_.imageOf(hit, search);
-    const std::array<int, 3> own = turnsInGrid(sweptBall(impact.a), positions_[impact.a]);
-    const std::array<int, 3> others = turnsInGrid(sweptBall(impact.b), positions_[impact.b]);
-    std::array<std::int16_t, 3> image{};
+  std::array<std::int16_t, 3> turnsBetween(const Path& a, const Path& b,
+                                           const std::array<int, 3>& seen) const {
+    const std::array<int, 3> own = turnsInGrid(sweptBall(a), positions_[a.slot]);
+    const std::array<int, 3> others = turnsInGrid(sweptBall(b), positions_[b.slot]);
+    std::array<std::int16_t, 3> turns{};
     for (std::size_t k = 0; k < 3; ++k) {
-      image[k] = static_cast<std::int16_t>(seen[k] + others[k] - own[k]);
+      turns[k] = static_cast<std::int16_t>(seen[k] + others[k] - own[k]);
     }
-    return image;
+    return turns;
   }
 
   Vec shiftOf(const std::array<std::int16_t, 3>& image) const {
     return {Real(image[0]) * period_[0], Real(image[1]) * period_[1], Real(image[2]) * period_[2]};
   }
 
-  // When a pair meets, if neither changes before: from what they have stored, so that it is the
-  // same bits whenever it is asked.
-  Real timeOf(const Impact& impact) const {
-    const Body& a = bodies_[impact.a];
-    const Body& b = bodies_[impact.b];
-    const Real start = std::max(a.time, b.time);
-    Vec dx = positionAt(impact.b, start) - positionAt(impact.a, start);
-    if (surroundings_.periodic) dx += shiftOf(impact.image);
-    const Real reach = a.radius + b.radius;
-    Vec dv = b.v - a.v;
-    if constexpr (kGravity) {
-      dv = velocityAt(impact.b, start) - velocityAt(impact.a, start);
-      const Vec da = accelerations_[impact.b] - accelerations_[impact.a];
-      if (dot(da, da) > 0) return start + timeOfImpactAccelerated<Real>(dx, dv, da, reach);
-    }
-    const Real wait = timeOfImpact<Real>(dx, dv, reach);
-    if (wait < kNever<Real> && haveJustMet(impact, dx, reach)) return kNever<Real>;
-    return start + wait;
-  }
-
   // In straight relative motion two balls that have just met do not meet again. In a periodic box
   // another image of the partner may be in reach too, but not in the same direction.
-  bool haveJustMet(const Impact& impact, const Vec& dx, Real reach) const {
-    const Card& a = cards_[impact.a];
-    const Card& b = cards_[impact.b];
-    if (a.met != b.id || b.met != a.id) return false;
-    const Real along = dot(dx, a.met_normal);
+  bool haveJustMet(const Path& a, const Path& b, const Vec& dx, Real reach) const {
+    const BallId id_a = cards_[a.slot].id, id_b = cards_[b.slot].id;
+    if (metBy(a) != id_b || metBy(b) != id_a) return false;
+    const Vec& normal = a.plan != nullptr ? a.plan->passed.normal : cards_[a.slot].met_normal;
+    const Real along = dot(dx, normal);
     return dot(dx, dx) < reach * reach * Real(1 + 1e-6) &&
-           (a.id < b.id ? along : -along) > Real(0.9) * reach;
+           (id_a < id_b ? along : -along) > Real(0.9) * reach;
   }
 
   // --- walls
 
   // When and where a ball, left to itself, meets its next wall.
-  void findWallVisit(Slot slot) {
-    if (walls_.empty()) return;
-    WallVisit& visit = wall_visits_[slot];
-    visit = {};
-    if (isFixed(slot)) return;
-    const Body& body = bodies_[slot];
+  WallVisit wallVisit(Slot slot, const Body& body) const {
+    WallVisit visit;
+    if (isFixed(slot)) return visit;
     for (std::size_t k = 0; k < walls_.size(); ++k) {
       const Wall<Real>& wall = walls_[k];
       Real pull = 0;
@@ -685,17 +840,32 @@ class Continuous final : public Method {
       const Real time = body.time + timeToWall<Real>(gap, dot(body.v, wall.normal), pull);
       if (time < visit.time) visit = {time, static_cast<std::uint32_t>(k)};
     }
+    return visit;
   }
 
-  void considerWall(Slot slot, std::vector<Impact>& found) const {
-    if (walls_.empty() || !(wall_visits_[slot].time <= frame_end_)) return;
+  void findWallVisit(Slot slot) {
+    if (!walls_.empty()) wall_visits_[slot] = wallVisit(slot, bodies_[slot]);
+  }
+
+  // The next impact of a path with a wall; its time is kNever where there is none in this frame.
+  Impact wallImpact(const Path& path) const {
     Impact impact;
-    impact.time = wall_visits_[slot].time;
-    impact.a = slot;
-    impact.b = kWall + wall_visits_[slot].wall;
-    impact.version_a = impact.version_b = cards_[slot].version;
+    impact.time = kNever<Real>;
+    if (walls_.empty()) return impact;
+    const WallVisit& visit =
+        path.plan != nullptr ? sideOf(*path.plan, path.slot).wall : wall_visits_[path.slot];
+    if (!(visit.time <= frame_end_)) return impact;
+    impact.time = visit.time;
+    impact.a = path.slot;
+    impact.b = kWall + visit.wall;
+    impact.version_a = impact.version_b = versionOf(path);
     impact.image = {0, 0, 0};
-    found.push_back(impact);
+    return impact;
+  }
+
+  void considerWall(const Path& path, std::vector<Impact>& found) const {
+    const Impact impact = wallImpact(path);
+    if (impact.time <= frame_end_) found.push_back(impact);
   }
 
   // --- impacts
@@ -706,6 +876,9 @@ class Continuous final : public Method {
       if (first.time != second.time) return first.time < second.time;
       return namesOf(first) < namesOf(second);
     };
+  }
+  auto after() const {
+    return [order = before()](const Impact& a, const Impact& b) { return order(b, a); };
   }
 
   std::pair<Partner, Partner> namesOf(const Impact& impact) const {
@@ -722,98 +895,170 @@ class Continuous final : public Method {
   // Takes all impacts up to a time, and those that follow from them.
   // @return false when `max_events` was not enough
   bool takeImpacts(Real until, std::uint64_t& max_events) {
-    const auto after = [order = before()](const Impact& a, const Impact& b) { return order(b, a); };
     while (frame_open_) {
-      const bool has_planned = next_ < agenda_.size();
-      const bool takes_later =
-          !later_.empty() && (!has_planned || before()(later_.front(), agenda_[next_]));
-      if (!takes_later && !has_planned) return true;
-      const Impact impact = takes_later ? later_.front() : agenda_[next_];
-      const bool stale = isStale(impact);
-      if (!stale && impact.time > until) return true;
-      if (!stale && max_events == 0) return false;
-      if (takes_later) {
-        std::pop_heap(later_.begin(), later_.end(), after);
-        later_.pop_back();
+      slice_end_ = sliceEnd(until, max_events);
+      gather();
+      if (one_image_is_near_ && slice_.size() >= kFewImpacts && slice_.size() <= max_events) {
+        makePlans();
       } else {
-        ++next_;
+        for (const Impact& impact : slice_) push(impact);
       }
-      expect(next_);
-      if (stale) continue;
-      --max_events;
-      ++statistics_.events;
-      now_ = std::max(now_, impact.time);
-      impact.b < kWall ? takeBalls(impact) : takeWall(impact.a, impact.b - kWall);
+      if (!takeInOrder(max_events)) {
+        if (max_events == 0) return false;
+        continue;
+      }
+      if (frame_open_) now_ = slice_end_;
+      if (slice_end_ >= until) return true;
     }
     return true;
   }
 
-  // Fetches from memory what the impacts soon after will need: first what tells where the rest is.
-  void expect(std::size_t next) const {
-    if (next + kSoon < agenda_.size()) {
-      const Impact& soon = agenda_[next + kSoon];
-      for (const Slot slot : {soon.a, soon.b}) {
-        if (slot >= kWall) continue;
-        __builtin_prefetch(&bodies_[slot]);
-        __builtin_prefetch(&cards_[slot]);
-        __builtin_prefetch(&positions_[slot]);
+  // A slice of the frame so long that few of its impacts have to do with each other.
+  Real sliceEnd(Real until, std::uint64_t max_events) const {
+    const auto most = std::min(kImpactsPerBallAndSlice * static_cast<double>(bodies_.size()),
+                               static_cast<double>(max_events / 2));
+    const Real share = Real(std::max(most, double(kFewImpacts)) / double(impacts_in_frame_ + 1));
+    const Real slices = std::ceil((until - now_) / (share * (frame_end_ - frame_start_)));
+    const Real end = slices > 1 ? now_ + (until - now_) / slices : until;
+    return end > now_ ? std::min(end, until) : until;
+  }
+
+  // Takes the impacts of the slice out of the pending ones; they stay in the order of the grid.
+  void gather() {
+    slice_.clear();
+    std::size_t kept = 0;
+    for (const Impact& impact : pending_) {
+      if (impact.time > slice_end_) {
+        pending_[kept++] = impact;
+      } else if (!isStale(impact)) {
+        slice_.push_back(impact);
       }
     }
-    if (next + kSooner < agenda_.size()) {
-      grid_.prefetch(positions_[agenda_[next + kSooner].a]);
+    pending_.resize(kept);
+  }
+
+  void push(const Impact& impact) {
+    waiting_.push_back(impact);
+    std::push_heap(waiting_.begin(), waiting_.end(), after());
+  }
+
+  void pop() {
+    std::pop_heap(waiting_.begin(), waiting_.end(), after());
+    waiting_.pop_back();
+  }
+
+  // Takes what waits for its turn, the earliest first, and what follows up to the end of the slice;
+  // then what is planned.
+  // @return false when `max_events` was not enough
+  bool takeInOrder(std::uint64_t& max_events) {
+    while (!waiting_.empty()) {
+      const Impact impact = waiting_.front();
+      if (!isStale(impact) && max_events <= plans_left_) {
+        settlePlans(&impact, max_events);
+        pending_.insert(pending_.end(), waiting_.begin(), waiting_.end());
+        waiting_.clear();
+        return false;
+      }
+      pop();
+      if (isStale(impact)) continue;
+      --max_events;
+      ++statistics_.events;
+      now_ = std::max(now_, impact.time);
+      fetchSoonest();
+      impact.b < kWall ? takeBalls(impact) : takeWall(impact);
+      if (!frame_open_) {
+        settlePlans(&impact, max_events);
+        waiting_.clear();
+        return true;
+      }
+    }
+    settlePlans(nullptr, max_events);
+    return true;
+  }
+
+  // The first of the heap are among the next.
+  void fetchSoonest() const {
+    for (std::size_t i = 0; i < std::min(waiting_.size(), std::size_t{3}); ++i) {
+      fetch(waiting_[i].a);
+      if (waiting_[i].b < kWall) fetch(waiting_[i].b);
     }
   }
 
   // Puts a ball's place and velocity at the instant of an impact.
-  void settleAt(Slot slot, Real time) {
-    Body& body = bodies_[slot];
-    const Vec x = positionAt(slot, time);
-    body.v = velocityAt(slot, time);
-    body.x = x;
-    body.time = time;
+  Body bodyAt(Slot slot, Real time) const {
+    return {positionAt(slot, time), velocityAt(slot, time), time, bodies_[slot].radius};
   }
 
-  void takeBalls(Impact impact) {
+  // What an impact of two balls leads to. Changes nothing.
+  void foresee(Impact impact, Plan& plan) const {
     if (cards_[impact.b].id < cards_[impact.a].id) {
       std::swap(impact.a, impact.b);
+      std::swap(impact.version_a, impact.version_b);
       for (std::int16_t& turns : impact.image) turns = static_cast<std::int16_t>(-turns);
     }
-    settleAt(impact.a, impact.time);
-    settleAt(impact.b, impact.time);
-    Body& a = bodies_[impact.a];
-    Body& b = bodies_[impact.b];
-    Card& card_a = cards_[impact.a];
-    Card& card_b = cards_[impact.b];
-    Vec dx = b.x - a.x;
+    plan.impact = impact;
+    Side& a = plan.sides[0];
+    Side& b = plan.sides[1];
+    a.body = bodyAt(impact.a, impact.time);
+    b.body = bodyAt(impact.b, impact.time);
+    a.history = cards_[impact.a].history;
+    b.history = cards_[impact.b].history;
+    Vec dx = b.body.x - a.body.x;
     if (surroundings_.periodic) dx += shiftOf(impact.image);
-    const Real reach = a.radius + b.radius;
+    const Real reach = a.body.radius + b.body.radius;
     const Vec pressing = acceleration(impact.a) - acceleration(impact.b);
-    const BallImpact<Real> passed = meetBall<Real>(dx, reach, pressing, restitution_, impact.time,
-                                                   {a.v, inverseMass(impact.a), card_a.history},
-                                                   {b.v, inverseMass(impact.b), card_b.history});
-    if (passed.exchange.impulse > 0) {
-      ++statistics_.ball_collisions;
-      statistics_.virial += double(passed.exchange.impulse * reach);
-      noteOverlap(passed.overlap);
-      watch(impact.time, {card_a.id, a.v, inverseMass(impact.a), passed.exchange.change1},
-            {card_b.id, b.v, inverseMass(impact.b), passed.exchange.change2}, passed.normal,
-            passed.exchange.approach_speed, reach);
-      report(impact, card_b.id, passed.normal, passed.exchange.impulse,
-             passed.exchange.approach_speed);
-    }
-    velocityChanged(impact.a);
-    velocityChanged(impact.b);
-    card_a.met = card_b.id;
-    card_b.met = card_a.id;
-    card_a.met_normal = card_b.met_normal = passed.normal;
-    const SweptBall rest_a = changeWithinFrame(impact.a);
-    const SweptBall rest_b = changeWithinFrame(impact.b);
-    searchRest(impact.a, rest_a);
-    searchRest(impact.b, rest_b);
+    plan.passed = meetBall<Real>(dx, reach, pressing, restitution_, impact.time,
+                                 {a.body.v, inverseMass(impact.a), a.history},
+                                 {b.body.v, inverseMass(impact.b), b.history});
+    a.body.x = wrapped(a.body.x);
+    b.body.x = wrapped(b.body.x);
   }
 
-  void takeWall(Slot slot, std::uint32_t index) {
-    settleAt(slot, wall_visits_[slot].time);
+  void takeBalls(const Impact& found) {
+    Plan& plan = at_hand_;
+    foresee(found, plan);
+    const Impact& impact = plan.impact;
+    if (plan.passed.exchange.impulse > 0) {
+      const Exchange<Real>& exchange = plan.passed.exchange;
+      watch(impact.time,
+            {cards_[impact.a].id, plan.sides[0].body.v, inverseMass(impact.a), exchange.change1},
+            {cards_[impact.b].id, plan.sides[1].body.v, inverseMass(impact.b), exchange.change2},
+            plan.passed.normal, exchange.approach_speed,
+            plan.sides[0].body.radius + plan.sides[1].body.radius);
+      if (log_ != nullptr) in_turn_.push_back({impact, collisionOf(plan)});
+    }
+    count(plan);
+    for (const Slot slot : {impact.a, impact.b}) {
+      bodies_[slot] = sideOf(plan, slot).body;
+      velocityChanged(slot);
+      putMet(slot, plan);
+    }
+    const SweptBall rest_a = changeWithinFrame(impact.a);
+    const SweptBall rest_b = changeWithinFrame(impact.b);
+    searchRest(impact.a, rest_a, impact);
+    searchRest(impact.b, rest_b, impact);
+  }
+
+  // What a ball keeps in mind of an impact with another.
+  void putMet(Slot slot, const Plan& plan) {
+    Card& card = cards_[slot];
+    card.history = sideOf(plan, slot).history;
+    card.met = cards_[slot == plan.impact.a ? plan.impact.b : plan.impact.a].id;
+    card.met_normal = plan.passed.normal;
+  }
+
+  void count(const Plan& plan) {
+    if (!(plan.passed.exchange.impulse > 0)) return;
+    ++statistics_.ball_collisions;
+    statistics_.virial += double(plan.passed.exchange.impulse *
+                                 (plan.sides[0].body.radius + plan.sides[1].body.radius));
+    noteOverlap(plan.passed.overlap);
+  }
+
+  void takeWall(const Impact& impact) {
+    const Slot slot = impact.a;
+    const std::uint32_t index = impact.b - kWall;
+    bodies_[slot] = bodyAt(slot, impact.time);
     Body& body = bodies_[slot];
     const Wall<Real>& wall = walls_[index];
     const Real pull = dot(acceleration(slot), wall.normal);
@@ -826,18 +1071,19 @@ class Continuous final : public Method {
     }
     if (passed.speed > 0) {
       ++statistics_.wall_collisions;
-      Impact impact;
-      impact.time = body.time;
-      impact.a = slot;
       const Vec at_rest = Vec::Zero();
       const Real change = (1 + passed.restitution) * passed.speed;
       watch(body.time, {cards_[slot].id, body.v, inverseMass(slot), change},
             {OrderWatch<Real>::wallKey(index), at_rest, 0, 0}, -wall.normal, passed.speed,
             body.radius);
-      report(impact, wall.partner, -wall.normal, change * Real(cards_[slot].mass), passed.speed);
+      if (log_ != nullptr) {
+        in_turn_.push_back(
+            {impact, collision(impact, wall.partner, wrapped(body.x - body.radius * wall.normal),
+                               -wall.normal, change * Real(cards_[slot].mass), passed.speed)});
+      }
     }
     velocityChanged(slot);
-    searchRest(slot, changeWithinFrame(slot));
+    searchRest(slot, changeWithinFrame(slot), impact);
   }
 
   void watch(Real time, const typename OrderWatch<Real>::Side& a,
@@ -850,7 +1096,7 @@ class Continuous final : public Method {
   // After any change of velocity: impacts found with the old one are stale; walls rested on are
   // left or kept.
   void velocityChanged(Slot slot) {
-    ++cards_[slot].version;
+    cards_[slot].version = ++last_version_;
     cards_[slot].met = kNobody;
     if constexpr (kGravity) {
       if (resting_[slot].count == 0) return;
@@ -865,26 +1111,250 @@ class Continuous final : public Method {
   SweptBall changeWithinFrame(Slot slot) {
     bringHome(slot);
     findWallVisit(slot);
-    const SweptBall rest = sweptBallInGrid(slot);
+    const SweptBall rest = sweptBallInGrid(pathOf(slot));
     if (frame_open_ && !grid_.change(positions_[slot], rest)) frame_open_ = false;
     return rest;
   }
 
   // Finds all impacts of a ball from its last change to the end of the frame.
-  void searchRest(Slot slot, const SweptBall& rest) {
+  void searchRest(Slot slot, const SweptBall& rest, const Impact& now) {
     if (!frame_open_) return;
-    Finder& finder = finders_.front();
-    finder.found.clear();
-    considerWall(slot, finder.found);
+    Worker& worker = workers_.front();
+    const Path path = pathOf(slot);
+    considerWall(path, worker.found);
     for (std::size_t level = 0; level < grid_.levels(); ++level) {
-      grid_.findAroundLater(level, rest, finder.search);
-      considerHits(slot, finder.search, finder.found);
+      grid_.findAroundLater(level, rest, worker.search);
+      noteHits(slot, worker);
     }
-    const auto after = [order = before()](const Impact& a, const Impact& b) { return order(b, a); };
-    for (const Impact& impact : finder.found) {
-      later_.push_back(impact);
-      std::push_heap(later_.begin(), later_.end(), after);
+    meetPairs(worker);
+    if (plans_left_ > 0) {
+      dropMet(path, now, worker);
+      for (const Pair& pair : worker.pairs) {
+        if (plan_of_[pair.other] == kNoPlan) continue;
+        const Impact impact = meeting(path, plannedPathOf(pair.other), pair.turns);
+        if (impact.time <= frame_end_) worker.found.push_back(impact);
+      }
     }
+    considerPairs(worker);
+    for (const Impact& impact : worker.found) {
+      if (impact.time > slice_end_) {
+        pending_.push_back(impact);
+      } else {
+        push(impact);
+      }
+    }
+    worker.found.clear();
+  }
+
+  // --- plans
+
+  // Plans what can be planned of the slice; the rest waits.
+  void makePlans() {
+    chooseLone();
+    plans_left_ = plan_count_ = lone_.size();
+    if (plans_.size() < plan_count_) plans_.resize(plan_count_ + plan_count_ / 4);
+    for (std::size_t i = 0; i < plan_count_; ++i) plans_[i].version = ++last_version_;
+    share(planners(), plan_count_, [this](std::size_t begin, std::size_t end, Worker&) {
+      inBatches(begin, end, [this](std::size_t first, std::size_t last) { draw(first, last); });
+    });
+    share(planners(), plan_count_, [this](std::size_t begin, std::size_t end, Worker& worker) {
+      inBatches(begin, end, [&](std::size_t first, std::size_t last) {
+        for (std::size_t i = first; i < last; ++i) search(plans_[i], worker);
+        meetPairs(worker);
+        considerPlans(worker);
+      });
+    });
+    collectFound();
+    for (Worker& worker : workers_) {
+      for (const std::uint32_t i : worker.disturbed) drop(i);
+      worker.disturbed.clear();
+    }
+  }
+
+  WorkerPool& planners() { return plan_count_ < kFewPlans ? alone_ : pool_; }
+
+  template <class Function>
+  static void inBatches(std::size_t begin, std::size_t end, const Function& f) {
+    for (; begin < end; begin += kBatch) f(begin, std::min(begin + kBatch, end));
+  }
+
+  // Sorts out the impacts of the slice that share no ball; the others wait for their turn.
+  void chooseLone() {
+    plan_of_.resize(bodies_.size(), kNoPlan);
+    lone_.clear();
+    const auto forBalls = [](const Impact& impact, auto f) {
+      f(impact.a);
+      if (impact.b < kWall) f(impact.b);
+    };
+    for (const Impact& impact : slice_) {
+      forBalls(impact, [this](Slot slot) {
+        plan_of_[slot] = plan_of_[slot] == kNoPlan ? kOnePlan : kManyPlans;
+      });
+    }
+    for (const Impact& impact : slice_) {
+      if (isLone(impact)) {
+        lone_.push_back(impact);
+      } else {
+        push(impact);
+      }
+    }
+    for (const Impact& impact : waiting_) {
+      forBalls(impact, [this](Slot slot) { plan_of_[slot] = kNoPlan; });
+    }
+    for (std::size_t i = 0; i < lone_.size(); ++i) {
+      plan_of_[lone_[i].a] = plan_of_[lone_[i].b] = static_cast<std::uint32_t>(i);
+    }
+  }
+
+  // Balls that rest on walls are left to takeBalls().
+  bool isLone(const Impact& impact) const {
+    if (impact.b >= kWall) return false;
+    if constexpr (kGravity) {
+      if (resting_[impact.a].count > 0 || resting_[impact.b].count > 0) return false;
+    }
+    return plan_of_[impact.a] == kOnePlan && plan_of_[impact.b] == kOnePlan;
+  }
+
+  // Computes some plans, and lets the grid show both paths of their balls.
+  void draw(std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      fetch(lone_[i].a);
+      fetch(lone_[i].b);
+    }
+    for (std::size_t i = begin; i < end; ++i) {
+      grid_.fetch(positions_[lone_[i].a]);
+      grid_.fetch(positions_[lone_[i].b]);
+    }
+    for (std::size_t i = begin; i < end; ++i) draw(plans_[i], lone_[i]);
+  }
+
+  // Fetches from memory what an impact of a ball will need.
+  void fetch(Slot slot) const {
+    touch(&bodies_[slot]);
+    touch(&cards_[slot]);
+    touch(&positions_[slot]);
+    if (!walls_.empty()) touch(&wall_visits_[slot]);
+  }
+
+  void draw(Plan& plan, const Impact& impact) {
+    foresee(impact, plan);
+    plan.state = Plan::State::open;
+    for (const Slot slot : {plan.impact.a, plan.impact.b}) {
+      Side& side = sideOf(plan, slot);
+      if (!walls_.empty()) side.wall = wallVisit(slot, side.body);
+      const SweptBall rest = sweptBallInGrid({slot, &side.body, &plan});
+      if (!grid_.add(positions_[slot], rest)) plan.state = Plan::State::leads_too_far;
+    }
+  }
+
+  // Finds whom the balls of a plan may meet.
+  void search(const Plan& plan, Worker& worker) const {
+    if (plan.state != Plan::State::open) worker.disturbed.push_back(plan_of_[plan.impact.a]);
+    for (const Slot slot : {plan.impact.a, plan.impact.b}) {
+      const Path path = {slot, &sideOf(plan, slot).body, &plan};
+      noteImpact(wallImpact(path), worker);
+      const SweptBall rest = sweptBallInGrid(path);
+      for (std::size_t level = 0; level < grid_.levels(); ++level) {
+        grid_.findAroundLater(level, rest, worker.search);
+        noteHits(slot, worker);
+      }
+    }
+  }
+
+  // What planned paths meet: others as they are now, and as they are planned, each two once.
+  void considerPlans(Worker& worker) const {
+    for (const Pair& pair : worker.pairs) {
+      const Path path = plannedPathOf(pair.slot);
+      if (pair.other != partnerOf(path)) {
+        noteImpact(meeting(path, pathOf(pair.other), pair.turns), worker);
+      }
+      if (plan_of_[pair.other] != kNoPlan && pair.slot < pair.other) {
+        noteImpact(meeting(path, plannedPathOf(pair.other), pair.turns), worker);
+      }
+    }
+    worker.pairs.clear();
+  }
+
+  // Notes an impact that plans lead to: within the slice they do not hold.
+  void noteImpact(const Impact& impact, Worker& worker) const {
+    if (impact.time > slice_end_) {
+      if (impact.time <= frame_end_) worker.found.push_back(impact);
+      return;
+    }
+    for (const Slot slot : {impact.a, impact.b}) {
+      if (slot < kWall && plan_of_[slot] != kNoPlan) worker.disturbed.push_back(plan_of_[slot]);
+    }
+  }
+
+  Path plannedPathOf(Slot slot) const {
+    const Plan& plan = plans_[plan_of_[slot]];
+    return {slot, &sideOf(plan, slot).body, &plan};
+  }
+
+  // Ends the plans that a new path meets within the slice, at an impact of now: those that are
+  // earlier have come true, the others wait for their turn.
+  void dropMet(const Path& path, const Impact& now, const Worker& worker) {
+    for (const Pair& pair : worker.pairs) {
+      const std::uint32_t index = plan_of_[pair.other];
+      if (index == kNoPlan) continue;
+      if (meeting(path, plannedPathOf(pair.other), pair.turns).time > slice_end_ &&
+          meeting(path, pathOf(pair.other), pair.turns).time > slice_end_) {
+        continue;
+      }
+      if (before()(plans_[index].impact, now)) {
+        comeTrue(plans_[index]);
+      } else {
+        drop(index);
+      }
+    }
+  }
+
+  // Ends a plan: its impact waits for its turn.
+  void drop(std::uint32_t index) {
+    Plan& plan = plans_[index];
+    if (plan.state == Plan::State::dropped) return;
+    plan.state = Plan::State::dropped;
+    plan_of_[plan.impact.a] = plan_of_[plan.impact.b] = kNoPlan;
+    --plans_left_;
+    push(plan.impact);
+  }
+
+  void comeTrue(Plan& plan) {
+    plan.state = Plan::State::came_true;
+    for (const Slot slot : {plan.impact.a, plan.impact.b}) {
+      const Side& side = sideOf(plan, slot);
+      bodies_[slot] = side.body;
+      cards_[slot].version = plan.version;
+      putMet(slot, plan);
+      if (!walls_.empty()) wall_visits_[slot] = side.wall;
+      plan_of_[slot] = kNoPlan;
+    }
+  }
+
+  // Lets the plans come true that are left: all, or those before `bound`; then the others are
+  // pending again.
+  void settlePlans(const Impact* bound, std::uint64_t& max_events) {
+    if (bound != nullptr && plans_left_ > 0) {
+      for (std::uint32_t i = 0; i < plan_count_; ++i) {
+        Plan& plan = plans_[i];
+        if (plan.state != Plan::State::open || before()(plan.impact, *bound)) continue;
+        drop(i);
+      }
+    }
+    share(planners(), plan_count_, [this](std::size_t begin, std::size_t end, Worker&) {
+      for (std::size_t i = begin; i < end; ++i) {
+        if (plans_[i].state == Plan::State::open) comeTrue(plans_[i]);
+      }
+    });
+    for (std::size_t i = 0; i < plan_count_; ++i) {
+      if (plans_[i].state != Plan::State::came_true) continue;
+      count(plans_[i]);
+      now_ = std::max(now_, plans_[i].impact.time);
+    }
+    statistics_.events += plans_left_;
+    max_events -= plans_left_;
+    report();
+    plan_count_ = plans_left_ = 0;
   }
 
   // --- bookkeeping
@@ -893,18 +1363,49 @@ class Continuous final : public Method {
     statistics_.deepest_overlap = std::max(statistics_.deepest_overlap, double(overlap));
   }
 
-  void report(const Impact& impact, Partner b, const Vec& n, Real impulse, Real speed) {
-    if (log_ == nullptr) return;
-    const Body& body = bodies_[impact.a];
+  Collision collisionOf(const Plan& plan) const {
+    const Body& a = plan.sides[0].body;
+    const Vec point = wrapped(a.x + a.radius * plan.passed.normal);
+    return collision(plan.impact, cards_[plan.impact.b].id, point, plan.passed.normal,
+                     plan.passed.exchange.impulse, plan.passed.exchange.approach_speed);
+  }
+
+  Collision collision(const Impact& impact, Partner b, const Vec& point, const Vec& normal,
+                      Real impulse, Real speed) const {
     Collision collision;
     collision.time = origin_ + double(impact.time);
     collision.a = cards_[impact.a].id;
     collision.b = b;
-    collision.point = wrapped(body.x + body.radius * n).template cast<double>();
-    collision.normal = n.template cast<double>();
+    collision.point = point.template cast<double>();
+    collision.normal = normal.template cast<double>();
     collision.impulse = double(impulse);
     collision.approach_speed = double(speed);
-    log_->add(collision);
+    return collision;
+  }
+
+  // Logs what happened in the slice in order of time: of the impacts in turn, each after what led
+  // to it, and of the plans.
+  void report() {
+    if (log_ == nullptr) return;
+    happened_.clear();
+    for (std::uint32_t i = 0; i < plan_count_; ++i) {
+      const Plan& plan = plans_[i];
+      if (plan.state == Plan::State::came_true && plan.passed.exchange.impulse > 0) {
+        happened_.push_back(i);
+      }
+    }
+    std::sort(happened_.begin(), happened_.end(), [this](std::uint32_t a, std::uint32_t b) {
+      return before()(plans_[a].impact, plans_[b].impact);
+    });
+    std::size_t next = 0;
+    for (const Reported& reported : in_turn_) {
+      while (next < happened_.size() && before()(plans_[happened_[next]].impact, reported.impact)) {
+        log_->add(collisionOf(plans_[happened_[next++]]));
+      }
+      log_->add(reported.collision);
+    }
+    while (next < happened_.size()) log_->add(collisionOf(plans_[happened_[next++]]));
+    in_turn_.clear();
   }
 
   Surroundings surroundings_;
@@ -927,12 +1428,27 @@ class Continuous final : public Method {
   Real frame_end_ = 0;    // s, in this era
   SweptGrid grid_;
   HugePageVector<std::uint32_t> positions_;  // in the grid, by slot
-  std::vector<Impact> agenda_;               // found at the start, in order
-  std::size_t next_ = 0;                     // in agenda_
-  std::vector<Impact> later_;                // found since: a heap, the earliest first
+  bool one_image_is_near_ = true;            // of any ball to another that it may meet
+  std::vector<Impact> pending_;              // found, and not looked at since
+  std::size_t impacts_in_frame_ = 0;         // found at its start
+
+  // The slice.
+  Real slice_end_ = 0;           // s, in this era
+  std::vector<Impact> slice_;    // its impacts
+  std::vector<Impact> waiting_;  // those taken in turn: a heap, the earliest first
+  std::vector<Impact> lone_;     // those planned
+  std::vector<Plan> plans_;      // of which plan_count_ are of this slice
+  std::size_t plan_count_ = 0;
+  std::size_t plans_left_ = 0;           // of these, not dropped
+  std::vector<std::uint32_t> plan_of_;   // by slot
+  Plan at_hand_;                         // of the impact that is taken
+  std::uint32_t last_version_ = 0;       // given to a ball
+  std::vector<Reported> in_turn_;        // to be logged
+  std::vector<std::uint32_t> happened_;  // plans, to be logged
+
   WorkerPool pool_;
   WorkerPool alone_;
-  std::vector<Finder> finders_;  // one a thread
+  std::vector<Worker> workers_;  // one a thread
 
   // How frames and cells were chosen.
   Real frame_length_ = 0;                        // s

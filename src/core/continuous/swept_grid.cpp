@@ -27,6 +27,17 @@ double occupancy(double count, double reach, int dimension, double volume) {
   return std::min(count, count * power(2 * reach, dimension) / volume);
 }
 
+// The smallest sphere around two, and a margin.
+SweptSphere around(const SweptSphere& a, const SweptSphere& b, float margin) {
+  const float x = b.x - a.x, y = b.y - a.y, z = b.z - a.z;
+  const float distance = std::sqrt(x * x + y * y + z * z);
+  if (distance + b.r <= a.r) return a;
+  if (distance + a.r <= b.r) return b;
+  const float r = (distance + a.r + b.r) / 2;
+  const float share = (r - a.r) / distance;
+  return {a.x + share * x, a.y + share * y, a.z + share * z, r + margin};
+}
+
 }  // namespace
 
 double SweptGrid::volume() const {
@@ -299,15 +310,27 @@ std::array<int, 3> SweptGrid::imageOf(const LaneHit& hit, const SweptSearch& sea
   return image;
 }
 
-bool SweptGrid::change(std::size_t p, const SweptBall& ball) {
-  const SweptSphere sphere = sphereOf(ball);
+// Whether searches would find it, given where the ball began the frame.
+bool SweptGrid::staysNear(std::size_t p, const SweptSphere& sphere) const {
   const SweptSphere& first = first_[p];
   const double x = double(sphere.x - first.x), y = double(sphere.y - first.y),
                z = double(sphere.z - first.z);
   // Of the two margins that searches add, one is in the sphere's radius already.
   const double limit = levels_[levelAt(p)].reach_later * per_unit_ + 1.5 * double(margin_);
-  if (!(std::sqrt(x * x + y * y + z * z) + double(sphere.r) <= limit)) return false;
+  return std::sqrt(x * x + y * y + z * z) + double(sphere.r) <= limit;
+}
+
+bool SweptGrid::change(std::size_t p, const SweptBall& ball) {
+  const SweptSphere sphere = sphereOf(ball);
+  if (!staysNear(p, sphere)) return false;
   lanes_.set(p, sphere);
+  return true;
+}
+
+bool SweptGrid::add(std::size_t p, const SweptBall& ball) {
+  const SweptSphere sphere = sphereOf(ball);
+  if (!staysNear(p, sphere)) return false;
+  lanes_.set(p, around(lanes_.at(p), sphere, margin_));
   return true;
 }
 

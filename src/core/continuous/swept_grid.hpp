@@ -85,6 +85,7 @@ class SweptGrid {
   bool hasOutgrownItsCells() const { return longest_ > 2 * planned_; }
 
   std::uint32_t slotAt(std::size_t position) const { return slots_[position]; }
+  void fetchSlot(std::size_t position) const { touch(&slots_[position]); }
 
   /// From now on the ball at each position has the position's own number.
   void renumber() {
@@ -119,23 +120,28 @@ class SweptGrid {
   /// So many periods along each axis lies the image that was hit from the one that middleAt tells.
   std::array<int, 3> imageOf(const LaneHit& hit, const SweptSearch& search) const;
 
-  /// Fetches from memory what a search around a ball begins with.
-  void prefetch(std::size_t p) const {
+  /// Fetches from memory what change() or add() of a ball needs.
+  void fetch(std::size_t p) const {
     for (const HugePageVector<float>* lane : {&lanes_.x, &lanes_.y, &lanes_.z, &lanes_.r}) {
-      __builtin_prefetch(lane->data() + p);
+      touch(lane->data() + p);
     }
-    __builtin_prefetch(&first_[p]);
-    const std::uint32_t* cell = begins() + keys_[slots_[p]];
-    const auto cells = static_cast<std::ptrdiff_t>(levels_.front().cells[0]);
-    for (const std::ptrdiff_t row : {-cells, std::ptrdiff_t{0}, cells}) {
-      __builtin_prefetch(cell + row);
-    }
+    touch(&first_[p]);
   }
 
   /// Changes the path of a ball.
   /// @return false when it leads too far from where the ball began the frame: searches would not
   ///         find it, and the frame has to end
   bool change(std::size_t p, const SweptBall& ball);
+
+  /// Adds a path that a ball may take to the one it has; returns as change() does.
+  bool add(std::size_t p, const SweptBall& ball);
+
+  /// How far from the middle of its first path a ball may touch something, at most, m.
+  double reach() const {
+    double reach = 0;
+    for (const Level& level : levels_) reach = std::max(reach, level.reach_later);
+    return reach;
+  }
 
   /// Finds the balls of the same level that may meet the ball at `position` in this frame, each
   /// pair from one of its ends only. All balls are on their first paths. Quick for one position
@@ -286,6 +292,7 @@ class SweptGrid {
   void addWrapped(const Level& level, const std::uint32_t* begins, Range x, float sy, float sz,
                   SweptSearch& search) const;
   void run(const SweptSphere& sphere, SweptSearch& search) const;
+  bool staysNear(std::size_t p, const SweptSphere& sphere) const;
 
   // --- filling
 

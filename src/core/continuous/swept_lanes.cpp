@@ -1,5 +1,7 @@
 #include "continuous/swept_lanes.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cstring>
 #if defined(__x86_64__)
 #include <immintrin.h>
@@ -17,17 +19,24 @@ namespace {
 // Share of squares by which single precision may falsify sums of three: 16 roundings.
 constexpr float kSlack = 1e-6F;
 
-namespace plain {
-constexpr std::size_t kLanes = 4;
-typedef float Floats __attribute__((vector_size(16)));        // NOLINT(modernize-use-using)
-typedef std::int32_t Flags __attribute__((vector_size(16)));  // NOLINT(modernize-use-using)
+// As many lanes as most runs are long; narrower instructions take them in parts.
+constexpr std::size_t kLanes = SweptLanes::kWidth;
+typedef float Floats __attribute__((vector_size(4 * kLanes)));        // NOLINT(modernize-use-using)
+typedef std::int32_t Flags __attribute__((vector_size(4 * kLanes)));  // NOLINT(modernize-use-using)
 
-inline unsigned bitsOf(const Flags& flags) {
+namespace plain {
+inline __attribute__((always_inline)) unsigned bitsOf(const Flags& flags) {
+  unsigned bits = 0;
 #if defined(__x86_64__)
-  return static_cast<unsigned>(_mm_movemask_ps((__m128)flags));  // NOLINT: the bits as they are
+  for (unsigned i = 0; i < kLanes / 4; ++i) {
+    __m128 part;
+    std::memcpy(&part, reinterpret_cast<const char*>(&flags) + 16 * i, 16);
+    bits |= static_cast<unsigned>(_mm_movemask_ps(part)) << (4 * i);
+  }
 #else
-  return (flags[0] & 1U) | (flags[1] & 2U) | (flags[2] & 4U) | (flags[3] & 8U);
+  for (unsigned i = 0; i < kLanes; ++i) bits |= (flags[i] & 1U) << i;
 #endif
+  return bits;
 }
 
 #include "continuous/swept_lanes_kernel.inc"
@@ -39,12 +48,14 @@ inline unsigned bitsOf(const Flags& flags) {
 #pragma GCC push_options
 #pragma GCC target("avx2")
 namespace avx2 {
-constexpr std::size_t kLanes = 8;
-typedef float Floats __attribute__((vector_size(32)));        // NOLINT(modernize-use-using)
-typedef std::int32_t Flags __attribute__((vector_size(32)));  // NOLINT(modernize-use-using)
-
 inline __attribute__((always_inline)) unsigned bitsOf(const Flags& flags) {
-  return static_cast<unsigned>(_mm256_movemask_ps((__m256)flags));  // NOLINT: the bits
+  unsigned bits = 0;
+  for (unsigned i = 0; i < kLanes / 8; ++i) {
+    __m256 part;
+    std::memcpy(&part, reinterpret_cast<const char*>(&flags) + 32 * i, 32);
+    bits |= static_cast<unsigned>(_mm256_movemask_ps(part)) << (8 * i);
+  }
+  return bits;
 }
 
 #include "continuous/swept_lanes_kernel.inc"
@@ -54,10 +65,6 @@ inline __attribute__((always_inline)) unsigned bitsOf(const Flags& flags) {
 #pragma GCC push_options
 #pragma GCC target("avx512f,avx512dq")
 namespace avx512 {
-constexpr std::size_t kLanes = 16;
-typedef float Floats __attribute__((vector_size(64)));        // NOLINT(modernize-use-using)
-typedef std::int32_t Flags __attribute__((vector_size(64)));  // NOLINT(modernize-use-using)
-
 inline __attribute__((always_inline)) unsigned bitsOf(const Flags& flags) {
   return static_cast<unsigned>(_mm512_movepi32_mask((__m512i)flags));  // NOLINT: the bits
 }

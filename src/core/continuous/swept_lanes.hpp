@@ -15,6 +15,10 @@ struct SweptSphere {
   float r;  ///< with all that the numbers may be off by
 };
 
+/// Reads a byte, so that it is in the cache when it is needed. Many reads of the like run at once;
+/// a prefetch would be dropped where the page's address is not in the cache either.
+inline void touch(const void* address) { (void)*static_cast<const volatile char*>(address); }
+
 /// Spheres side by side, one lane a ball.
 struct SweptLanes {
   static constexpr std::size_t kWidth = 16;  ///< so many at most are read at once
