@@ -155,25 +155,6 @@ class CellLevel {
     (before != kNoSlot ? next_[before] : guests_[index]) = after;
   }
 
-  /// Fetches the 27 cells around `c` from memory.
-  void prefetchAround(const CellCoordinates& c) const {
-    prefetchRows<3>(neighbours(1, c[1]).cell.data(), sideOf(neighbours(2, c[2])),
-                    neighbours(0, c[0]).cell[1]);
-  }
-
-  /// The same of the cell itself, and of the layer that gatherLayer() looks at.
-  void prefetchLayer(const CellCoordinates& c, std::size_t axis, std::size_t direction) const {
-    const std::uint32_t x = neighbours(0, c[0]).cell[axis == 0 ? direction : 1];
-    const std::uint32_t* const y = neighbours(1, c[1]).cell.data();
-    const AxisNeighbours& z = neighbours(2, c[2]);
-    __builtin_prefetch(&cells_[cellIndex(c)]);
-    if (axis == 1) {
-      prefetchRows<1>(y + direction, sideOf(z), x);
-    } else {
-      prefetchRows<3>(y, axis == 2 ? layerOf(z, direction) : sideOf(z), x);
-    }
-  }
-
   /// Adds the members of the 27 cells around `c`, and the guests there if `with_guests`.
   void gather(const CellCoordinates& c, bool with_guests, Candidates& candidates) const {
     gatherCells<3, 3>(neighbours(0, c[0]).cell.data(), neighbours(1, c[1]).cell.data(),
@@ -220,13 +201,6 @@ class CellLevel {
 
   // What 27 cells are copied to, all of each.
   static constexpr std::size_t kMostInPlace = 27 * sizeof(Cell) / sizeof(Slot);
-
-  template <std::size_t kRows>
-  void prefetchRows(const std::uint32_t* rows, Side planes, std::uint32_t column) const {
-    for (const std::uint32_t* z = planes.begin; z != planes.end; ++z) {
-      for (std::size_t j = 0; j < kRows; ++j) __builtin_prefetch(&cells_[*z + rows[j] + column]);
-    }
-  }
 
   template <std::size_t kColumns, std::size_t kRows>
   void gatherCells(const std::uint32_t* columns, const std::uint32_t* rows, Side planes,
@@ -497,19 +471,7 @@ class CellGrid {
     candidates.close();
   }
 
-  /// Fetches from memory the cells of a ball's own level that gatherNear() will look at.
-  void prefetchNear(const CellCoordinates& c, std::size_t level) const {
-    levels_[level].prefetchAround(c);
-  }
-
-  /// Of a ball that will cross next, the cell it will be in and the layer that will be new.
-  void prefetchNewLayer(const CellCoordinates& before, std::size_t level, std::size_t axis,
-                        int direction) const {
-    levels_[level].prefetchLayer(behind(before, level, axis, direction), axis,
-                                 direction > 0 ? 2 : 0);
-  }
-
-  /// Finds the balls in that layer, without those of other levels.
+  /// Finds, of its own level alone, the balls that will be new to one that crosses next.
   void foreseeNewLayer(const CellCoordinates& before, std::size_t level, std::size_t axis,
                        int direction, Candidates& candidates) const {
     candidates.count = 0;

@@ -272,8 +272,8 @@ class EventDriven final : public Method {
     return {std::min(agenda.id, other), std::max(agenda.id, other), slot};
   }
 
-  // Fetches from memory what balls that come up soon will need: each step needs what the one
-  // before has fetched.
+  // Fetches from memory what balls that come up soon will need: the second step needs what the
+  // first has fetched.
   auto expectation() {
     return [this](Slot slot, std::uint32_t buckets_ahead) {
       const Agenda<Real>& agenda = agendas_[slot];
@@ -282,42 +282,30 @@ class EventDriven final : public Method {
       if (buckets_ahead == EventQueue<Real, GoesFirst>::kSoon) {
         __builtin_prefetch(&bodies_[slot]);
         if (listed_) lists_.prefetch(slot);
-        if (meets) {
-          __builtin_prefetch(&bodies_[agenda.partner]);
-          __builtin_prefetch(&agendas_[agenda.partner]);
-          if (listed_) lists_.prefetch(agenda.partner);
-        }
-      } else if (buckets_ahead == EventQueue<Real, GoesFirst>::kSooner) {
-        if (crosses) prefetchNewCells(agenda);
-        if (!crosses && !listed_) grid_.prefetchNear(agenda.cell, agenda.level);
+        if (!meets) return;
+        __builtin_prefetch(&bodies_[agenda.partner]);
+        __builtin_prefetch(&agendas_[agenda.partner]);
+        if (listed_) lists_.prefetch(agenda.partner);
       } else if (crosses) {
         prefetchNewcomers(slot);
       } else {
         prefetchBodies(nearTo(slot));
-        if (meets) prefetchBodies(nearTo(agenda.partner));
+        // In cells the partner's are mostly the same, and dear to find.
+        if (meets && listed_) prefetchBodies(nearTo(agenda.partner));
       }
     };
   }
 
-  void prefetchNewCells(const Agenda<Real>& agenda) const {
-    if (listed_) {
-      grid_.prefetchNear(agenda.cell, agenda.level);
-    } else {
-      grid_.prefetchNewLayer(agenda.cell, agenda.level, agenda.crossing_axis,
-                             agenda.crossing_direction);
-    }
-  }
-
   void prefetchNewcomers(Slot slot) {
-    const Agenda<Real>& agenda = agendas_[slot];
     if (listed_) {
       const Near near = inCellsAround(slot);
       for (std::size_t i = 0; i < near.count; ++i) lists_.prefetchHome(near.slots[i]);
-    } else {
-      grid_.foreseeNewLayer(agenda.cell, agenda.level, agenda.crossing_axis,
-                            agenda.crossing_direction, candidates_);
-      prefetchBodies({candidates_.slots.data(), candidates_.count});
+      return;
     }
+    const Agenda<Real>& agenda = agendas_[slot];
+    grid_.foreseeNewLayer(agenda.cell, agenda.level, agenda.crossing_axis,
+                          agenda.crossing_direction, candidates_);
+    prefetchBodies({candidates_.slots.data(), candidates_.count});
   }
 
   void prefetchBodies(const Near& near) const {

@@ -59,7 +59,6 @@ class EventQueue {
  public:
   /// How many buckets ahead a ball is announced, each time for the next step of the fetching.
   static constexpr std::uint32_t kSoon = 3;
-  static constexpr std::uint32_t kSooner = 2;
   static constexpr std::uint32_t kNext = 1;
 
   /// @param agendas  by slot; outlive the queue
@@ -120,7 +119,7 @@ class EventQueue {
   }
 
   /// Looks for the next event.
-  /// @param expect  expect(slot, buckets ahead): a ball comes up kSoon, kSooner, kNext
+  /// @param expect  expect(slot, buckets ahead): a ball comes up kSoon, kNext
   /// @return whether there is one that is due by `limit`
   template <class Expect>
   bool isDue(Real limit, Expect expect) {
@@ -206,7 +205,7 @@ class EventQueue {
   void announce(Expect expect) {
     const Slot far = heads_[current_ + kFarAhead];
     if (far != kNoSlot) __builtin_prefetch(&agendas_[far]);
-    for (const std::uint32_t ahead : {kSoon, kSooner, kNext}) {
+    for (const std::uint32_t ahead : {kSoon, kNext}) {
       for (Slot s = heads_[current_ + ahead]; s != kNoSlot; s = agendas_[s].next) expect(s, ahead);
     }
   }
