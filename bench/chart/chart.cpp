@@ -1,5 +1,5 @@
 // Measures speed against accuracy: every scene of the chart by every method, and by other engines
-// where they are built in. Writes one row a run; draw.py makes the figures of them.
+// where they are built in. Writes one row a run; draw_chart.py makes the figures of them.
 #include <unistd.h>
 
 #include <algorithm>
@@ -25,9 +25,11 @@ namespace {
 constexpr int kFinest = 14;  // the shortest step is R/v 2^-kFinest
 constexpr int kPhases = 20;  // one fixed phase would hide an error of first order
 constexpr int kFewestPhases = 3;
-constexpr std::size_t kMany = 200;  // balls: their steps are dear, and may take
-constexpr double kManyFold = 5;     // so many times as long
-constexpr double kLongest = 20;     // s of CPU time, for one step length by one entrant
+constexpr std::size_t kMany = 200;    // balls: their steps are dear, and may take
+constexpr double kManyFold = 5;       // so many times as long
+constexpr double kLongest = 6;        // s of CPU time, for one step length by one entrant
+constexpr double kLongestExact = 25;  // s of CPU time, for all runs of an entrant without a step
+constexpr double kLongestSweep = 60;  // s by the clock: then an entrant's finer steps are given up
 
 struct Options {
   std::string source = BALL_SIM_SOURCE_DIR;
@@ -43,18 +45,16 @@ struct Effort {
   double statistics_budget = 0.6;  // s, likewise
   int stride = 1;                  // of k
   int phases = kPhases;
-  double horizon = 1;  // share, where the truth is dear
 };
 
 Effort effortOf(const Options& options) {
   if (!options.quick) return {};
-  return {0.02, 0.1, 3, 5, 0.15};
+  return {0.02, 0.1, 3, 5};
 }
 
 /// A scene with all that is known about it.
 struct Case {
   PreparedScene scene;
-  double horizon = 0;  // s
   Trajectory truth;
   TrueStatistics statistics;
 };
@@ -62,11 +62,15 @@ struct Case {
 Case prepareCase(const ScenePlan& plan, const Options& options) {
   Case made;
   made.scene = prepare(plan, options.source);
-  const bool dear = plan.truth == Truth::multiprecision && made.scene.balls.size() >= 100;
-  made.horizon = plan.horizon * (dear ? effortOf(options).horizon : 1);
-  made.truth = trueTrajectory(made.scene, made.horizon);
+  made.truth = trueTrajectory(made.scene, plan.horizon);
   made.statistics = trueStatistics(made.scene);
   return made;
+}
+
+using Clock = std::chrono::steady_clock;
+
+double secondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
 /// One line that says how far it is.
@@ -75,14 +79,13 @@ class Progress {
   void show(double share, const std::string& what) {
     const auto full = static_cast<std::size_t>(share * 30);
     const std::string bar = std::string(full, '=') + std::string(30 - full, ' ');
-    const double seconds = std::chrono::duration<double>(Clock::now() - start_).count();
+    const double seconds = secondsSince(start_);
     std::fprintf(stderr, "%s[%s] %3.0f %%  %4.0f s  %s%s", terminal_ ? "\r" : "", bar.c_str(),
                  100 * share, seconds, what.c_str(), terminal_ ? "\033[K" : "\n");
     if (terminal_ && share >= 1) std::fputc('\n', stderr);
   }
 
  private:
-  using Clock = std::chrono::steady_clock;
   Clock::time_point start_ = Clock::now();
   bool terminal_ = isatty(STDERR_FILENO) == 1;
 };
@@ -142,44 +145,51 @@ class Report {
   void measure(const Case& one, const Entrant& entrant) {
     const std::string refusal = entrant.refusal(one.scene);
     if (!refusal.empty()) {
-      Row row;
-      row.scene = one.scene.plan.name;
-      row.entrant = entrant.name;
-      row.kind = entrant.kind;
-      row.balls = one.scene.balls.size();
-      row.exponent = -1;
-      row.failure = "left out: " + refusal;
-      write(row);
+      write(failed(one, entrant, -1, "left out: " + refusal));
     } else if (entrant.kind == Kind::exact) {
-      isolated(one, entrant, 0, [&](const Sink& sink) { exactRuns(one, entrant, sink); });
+      isolated(one, entrant, 0, kLongestExact,
+               [&](const Sink& sink) { exactRuns(one, entrant, sink); });
     } else {
-      for (int k = 0; k <= kFinest; k += effort_.stride) {
-        isolated(one, entrant, k, [&](const Sink& sink) { steppedRuns(one, entrant, k, sink); });
+      sweep(one, entrant);
+    }
+  }
+
+  void sweep(const Case& one, const Entrant& entrant) {
+    const Clock::time_point start = Clock::now();
+    for (int k = 0; k <= kFinest; k += effort_.stride) {
+      if (secondsSince(start) > kLongestSweep) {
+        write(failed(one, entrant, k, "given up: longer steps took too long"));
+      } else {
+        isolated(one, entrant, k, kLongest,
+                 [&](const Sink& sink) { steppedRuns(one, entrant, k, sink); });
       }
     }
   }
 
+  // A row that tells why there is none. k: of the step, or -1.
+  static Row failed(const Case& one, const Entrant& entrant, int k, const std::string& why) {
+    Row row;
+    row.scene = one.scene.plan.name;
+    row.entrant = entrant.name;
+    row.kind = entrant.kind;
+    row.balls = one.scene.balls.size();
+    row.exponent = k;
+    if (k >= 0) row.step = stepOf(one, k);
+    row.failure = why;
+    return row;
+  }
+
   using Sink = std::function<void(const Row&)>;
 
-  void isolated(const Case& one, const Entrant& entrant, int k,
+  void isolated(const Case& one, const Entrant& entrant, int k, double longest,
                 const std::function<void(const Sink&)>& work) {
     const Outcome outcome = runIsolated(
         [&](const std::function<void(const std::string&)>& give) {
           work([&](const Row& row) { give(csvLine(row)); });
         },
-        kLongest);
+        longest);
     for (const std::string& line : outcome.lines) file_ << line << "\n";
-    if (!outcome.failure.empty()) {
-      Row row;
-      row.scene = one.scene.plan.name;
-      row.entrant = entrant.name;
-      row.kind = entrant.kind;
-      row.balls = one.scene.balls.size();
-      row.exponent = k;
-      row.step = stepOf(one, k);
-      row.failure = outcome.failure;
-      write(row);
-    }
+    if (!outcome.failure.empty()) write(failed(one, entrant, k, outcome.failure));
     file_.flush();
   }
 
@@ -188,10 +198,10 @@ class Report {
   }
 
   void exactRuns(const Case& one, const Entrant& entrant, const Sink& sink) const {
-    const double step = one.horizon / 200;
-    measurePath(one.scene, one.truth, one.horizon, entrant, step, 0);  // warms up
+    const double step = one.scene.plan.horizon / 200;
+    measurePath(one.scene, one.truth, one.scene.plan.horizon, entrant, step, 0);  // warms up
     for (int i = 0; i < std::min(one.scene.plan.repeats, effort_.phases); ++i) {
-      sink(measurePath(one.scene, one.truth, one.horizon, entrant, step, 0));
+      sink(measurePath(one.scene, one.truth, one.scene.plan.horizon, entrant, step, 0));
     }
     if (one.scene.plan.statistics > 0 && entrant.name != "brute_force") {  // it takes too long
       sink(measureStatistics(one.scene, one.statistics, one.scene.plan.statistics, entrant,
@@ -204,15 +214,17 @@ class Report {
     const double per_second =
         entrant.cost * 1e-9 * static_cast<double>(one.scene.balls.size()) / step;
     const double setup = entrant.setup_cost * static_cast<double>(one.scene.balls.size());
-    const double one_path = 2 * (per_second * one.horizon + setup);  // timed, and looked at
+    const double one_path =
+        2 * (per_second * one.scene.plan.horizon + setup);  // timed, and looked at
     const double budget = effort_.path_budget * (one.scene.balls.size() > kMany ? kManyFold : 1);
     const int affordable = static_cast<int>(std::min(budget / one_path, 1e6));
     const int phases = std::min({effort_.phases, affordable, one.scene.plan.repeats});
-    if (one.horizon / step >= 4 && phases >= kFewestPhases) {
+    if (one.scene.plan.horizon / step >= 4 && phases >= kFewestPhases) {
       RandomSource random(static_cast<std::uint64_t>(k) + 1);
-      measurePath(one.scene, one.truth, one.horizon, entrant, step, 0);  // warms up
+      measurePath(one.scene, one.truth, one.scene.plan.horizon, entrant, step, 0);  // warms up
       for (int i = 0; i < phases; ++i) {
-        Row row = measurePath(one.scene, one.truth, one.horizon, entrant, step, random.uniform());
+        Row row = measurePath(one.scene, one.truth, one.scene.plan.horizon, entrant, step,
+                              random.uniform());
         row.exponent = k;
         sink(row);
       }
@@ -238,10 +250,10 @@ class Report {
 
 void writeScenes(const std::string& path) {
   std::ofstream file(path);
-  file << "scene,question,horizon,statistics\n";
+  file << "scene,question,horizon,statistics,truth\n";
   for (const ScenePlan& plan : scenePlans()) {
     file << plan.name << ",\"" << plan.question << "\"," << plan.horizon << "," << plan.statistics
-         << "\n";
+         << ",\"" << nameOf(plan.truth) << "\"\n";
   }
 }
 

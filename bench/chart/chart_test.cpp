@@ -1,12 +1,15 @@
 // The chart's own tools against what is known without them. Built with BALL_SIM_CHART where the
 // tests are.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <csignal>
+#include <tuple>
 
 #include "isolation.hpp"
 #include "measurement.hpp"
+#include "oracle.hpp"
 #include "state_check.hpp"
 
 namespace ball_sim::core::chart {
@@ -51,6 +54,30 @@ TEST(Trajectory, ofABouncingBallIsTheGeometricSeries) {
 
 TEST(Trajectory, ofTheBilliardCountsPi) {
   EXPECT_EQ(trueTrajectory(prepared("pi_billiard"), 4).impactsWithin(0, 4).size(), 3141u);
+}
+
+// Two codes in 256 bits that share no line of physics: walls in the plane, periodic faces, balls of
+// any size and mass. Both keep their motion in doubles, hence the bound: some ulps of 10 m.
+TEST(Trajectory, ofTheOracleIsThatOfAllPairs) {
+  for (const auto& [name, until, least] :
+       {std::tuple<const char*, double, std::size_t>{"twelve_discs", 1.5, 30},
+        {"fluid_0.2_100", 0.1, 5},
+        {"fluid_0.9_100", 0.005, 5},
+        {"polydisperse", 0.05, 5}}) {
+    const PreparedScene scene = prepared(name);
+    const Trajectory oracle = oracleTrajectory(scene, until);
+    const Trajectory all_pairs = allPairsTrajectory(scene, until);
+    EXPECT_EQ(oracle.impactsWithin(0, until), all_pairs.impactsWithin(0, until)) << name;
+    EXPECT_GE(oracle.impactsWithin(0, until).size(), least) << name;
+    for (const double date : {until / 3, until}) {
+      EXPECT_LT(largestError(scene, all_pairs, date, statesAt(oracle, date)), 1e-14) << name;
+    }
+  }
+}
+
+TEST(Trajectory, oracleRefusesWhatItDoesNotModel) {
+  EXPECT_THROW(oracleTrajectory(prepared("bouncing"), 1), std::invalid_argument);
+  EXPECT_THROW(oracleTrajectory(prepared("break_shot"), 1), std::invalid_argument);
 }
 
 TEST(StateCheck, findsTheDeepestOverlapOfBallsAndWalls) {
@@ -128,6 +155,8 @@ TEST(Isolation, givesLinesAndSurvivesACrash) {
       },
       1);
   EXPECT_EQ(endless.failure, "gave no result in time");
+  const Outcome waiting = runIsolated([](const auto&) { pause(); }, 1);  // uses no CPU time
+  EXPECT_EQ(waiting.failure, "gave no result in time");
 }
 
 }  // namespace

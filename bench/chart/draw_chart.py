@@ -22,7 +22,7 @@ def lines(rows):
     """Rows by entrant, in the order of the legend, long steps first."""
     groups = collections.defaultdict(list)
     for row in rows:
-        if int(row['k']) >= 0 and row['cost']:
+        if int(row['k']) >= 0 and (row['cost'] or row['failed'] != '0'):
             groups[row['entrant']].append(row)
     for name in sorted(groups, key=style.order):
         yield name, sorted(groups[name], key=lambda row: int(row['k']))
@@ -36,6 +36,7 @@ def draw_lines(axes, rows, measure, floor=FLOOR, hollow=False, lower=None, upper
     """One line an entrant; where most runs failed, a cross at the top edge."""
     useful = [value(row, 'cost') for row in rows if row['cost'] and not mostly_failed(row)]
     fastest = min(useful, default=1e-9)  # runs that lost their balls cost nothing: to the left edge
+    slowest = max(useful, default=1e-9)  # those without an end: to the right edge
     for name, points in lines(rows):
         colour, sign, _ = style.look(name)
         good = [p for p in points if not mostly_failed(p) and measure(p) is not None]
@@ -43,16 +44,15 @@ def draw_lines(axes, rows, measure, floor=FLOOR, hollow=False, lower=None, upper
         y = [max(measure(p), floor) for p in good]
         axes.plot(x, y, color=colour, marker=sign, linewidth=1.1,
                   linestyle='--' if name in style.PEERS else '-',
-                  markersize=11 if name == 'event_driven' else 5,
-                  markerfacecolor='white' if hollow else colour, markeredgecolor=colour,
-                  zorder=5 if name == 'event_driven' else 3)
+                  zorder=5 if name == 'event_driven' else 3, **style.marker_of(name, hollow))
         if lower and upper:
             for p, cost in zip(good, x):
                 low, high = lower(p), upper(p)
                 if low is not None and high is not None:
                     axes.plot([cost, cost], [max(low, floor), max(high, floor)], color=colour,
                               linewidth=0.7, alpha=0.6, zorder=2)
-        failed = [max(value(p, 'cost'), fastest / 4) for p in points if mostly_failed(p)]
+        failed = [max(value(p, 'cost') or slowest * 2, fastest / 4)
+                  for p in points if mostly_failed(p)]
         top = axes.get_xaxis_transform()
         axes.plot(failed, [0.985] * len(failed), color=colour, marker='x', linestyle='none',
                   markersize=5, transform=top, clip_on=False, zorder=4)
@@ -84,8 +84,6 @@ def draw_error(axes, rows):
 def draw_valid_time(axes, rows, horizon):
     draw_lines(axes, rows, field('valid_time'), floor=horizon * 5e-3)
     axes.axhline(horizon, color='#b0b0b0', linewidth=0.8, linestyle=':')
-    axes.text(0.98, horizon, 'end of the comparison', fontsize=7.5, color='#606060', ha='right',
-              va='bottom', transform=axes.get_yaxis_transform())
     axes.set_ylabel('time right to 0.01 R, s')
     set_heights(axes, horizon * 3e-3, horizon * 3)
 
@@ -161,21 +159,27 @@ def lay_out(figure, names, notes):
                            top=1 - 0.75 / height)
 
 
+def legend_size(name):
+    return {'event_driven': 10, 'auto': 8}.get(name, 5)
+
+
 def legend(figure, names, **where):
     handles = []
     for name in sorted(names, key=style.order):
         colour, sign, label = style.look(name)
         handles.append(plt.Line2D([], [], color=colour, marker=sign, label=label, linewidth=1.1,
                                   linestyle='--' if name in style.PEERS else '-',
-                                  markersize=10 if name == 'event_driven' else 5))
+                                  **dict(style.marker_of(name), markersize=legend_size(name))))
     handles.append(plt.Line2D([], [], color='#404040', marker='x', linestyle='none',
                               label='failed (most runs)'))
     figure.legend(handles=handles, frameon=False, fontsize=8, columnspacing=1.2,
                   handletextpad=0.5, **where)
 
 
-def note_text(rows):
-    notes = []
+def note_text(scene, rows):
+    notes = ['R: the smallest sum of two radii. Each point is a time step, from the left R/v, R/2v, R/4v '
+             'and so on, median of up to 20 starting phases, bars: quartiles; exact methods but '
+             'continuous have no step. The true paths: %s.' % scene['truth']]
     failed = failures(rows)
     if failed:
         notes.append('× failed: ' + '; '.join(failed) + '.')
@@ -192,7 +196,7 @@ def draw_scene(scene, rows, machine, path):
     (error, valid, energy), (overlap, missed, rates) = panels
     error.set_title('1a  Paths: how far off at the end')
     draw_error(error, paths)
-    valid.set_title('1b  Paths: for how long they hold')
+    valid.set_title('1b  Paths: how long they hold (dotted: to the end)')
     draw_valid_time(valid, paths, float(scene['horizon']))
     energy.set_title('2a  Energy: relative error')
     draw_lines(energy, paths, field('energy_error'))
@@ -216,9 +220,9 @@ def draw_scene(scene, rows, machine, path):
         axes.set_xlabel(COST)
     figure.suptitle('%s: %s' % (scene['scene'], scene['question']), x=0.01, ha='left',
                     fontsize=12, fontweight='bold')
-    notes = note_text(rows)
-    names = {row['entrant'] for row in rows if row['cost']}
-    lay_out(figure, names, (notes + '\n' if notes else '') + machine)
+    notes = note_text(scene, rows)
+    names = {row['entrant'] for row in rows if int(row['k']) >= 0}
+    lay_out(figure, names, notes + '\n' + machine)
     style.save(figure, path)
 
 
@@ -234,15 +238,15 @@ def draw_overview(scenes, rows, machine, path):
         axes.set_title(textwrap.fill(scenes[name]['question'], 40), fontsize=9)
         axes.set_ylabel('')
         axes.set_xlabel(COST)
-        names |= {row['entrant'] for row in some if row['cost']}
+        names |= {row['entrant'] for row in some if int(row['k']) >= 0}
     figure.suptitle('Speed against accuracy: left is faster, down is more accurate\n', x=0.01,
                     ha='left', fontsize=12.5, fontweight='bold')
     lay_out(figure, names, textwrap.fill(
         'Each line is one method at steps from R/v (left) to finer and finer ones (right), each '
         'point the median of up to 20 starting phases, bars its quartiles; R: sum of two radii, v: '
-        'typical speed. Error: of the ball that is furthest off, against 256-bit arithmetic (the '
-        'gas: 64-bit). Dotted: 0.01 R. × : most runs failed (a ball left through a wall, energy '
-        'doubled, a crash).', 165) + '\n' + machine)
+        'typical speed. Error: of the ball that is furthest off, against 256-bit arithmetic. '
+        'Dotted: 0.01 R. × : most runs failed (a ball left through a wall, energy doubled, a crash, '
+        'no end).', 165) + '\n' + machine)
     style.save(figure, path)
 
 

@@ -8,6 +8,7 @@ import matplotlib.pyplot as plt  # noqa: E402
 # Colours that colour-blind people tell apart (Okabe, Ito 2008; Tol 2021), and a sign each besides.
 LOOKS = {
     'event_driven': ('#000000', '*', 'event_driven (exact)'),
+    'auto': ('#CC3311', 'o', 'auto (a ring around what it chose)'),
     'brute_force': ('#777777', 'D', 'brute_force (exact)'),
     'continuous': ('#0072B2', 'o', 'continuous (exact at any step)'),
     'discrete': ('#D55E00', 's', 'discrete'),
@@ -43,6 +44,16 @@ def look(name):
         colour, sign = SPARE[len(name) % len(SPARE)]
         LOOKS[name] = (colour, sign, name)
     return LOOKS[name]
+
+
+def marker_of(name, hollow=False):
+    """How the points of an entrant are drawn."""
+    colour = look(name)[0]
+    if name == 'auto':
+        return dict(markersize=15, markerfacecolor='none', markeredgecolor=colour,
+                    markeredgewidth=1.2)
+    return dict(markersize=11 if name == 'event_driven' else 5,
+                markerfacecolor='white' if hollow else colour, markeredgecolor=colour)
 
 
 def order(name):

@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -17,6 +18,7 @@
 namespace ball_sim::core::chart {
 namespace {
 
+constexpr double kPatience = 4;  // s by the clock for a second of CPU time
 constexpr const char* kTooLong = "gave no result in time";
 
 void writeAll(int file, const std::string& text) {
@@ -77,6 +79,7 @@ Outcome runIsolated(const std::function<void(const std::function<void(const std:
   if (child < 0) throw std::runtime_error("fork: " + std::string(std::strerror(errno)));
   if (child == 0) {
     close(ends[0]);
+    prctl(PR_SET_PDEATHSIG, SIGKILL);  // it does not outlive a report that is broken off
     silence();
     limitCpu(seconds);
     work([&](const std::string& line) { writeAll(ends[1], line + "\n"); });
@@ -85,7 +88,7 @@ Outcome runIsolated(const std::function<void(const std::function<void(const std:
   close(ends[1]);
   std::string text;
   Outcome outcome;
-  if (!readUntilClosed(ends[0], 30 * seconds, text)) {
+  if (!readUntilClosed(ends[0], kPatience * seconds, text)) {
     kill(child, SIGKILL);
     outcome.failure = kTooLong;
   }

@@ -12,10 +12,13 @@ namespace ball_sim::core::chart {
 
 /// Where the truth about a scene comes from.
 enum class Truth {
-  multiprecision,  ///< all pairs in 256-bit arithmetic
-  long_double,     ///< event_driven in 64-bit significands: where all pairs would take hours
-  at_rest,         ///< closed form: nothing moves
+  all_pairs,  ///< 256-bit arithmetic: all pairs, by the templates of brute_force
+  oracle,     ///< 256-bit arithmetic: oracle.hpp, for many balls
+  at_rest,    ///< closed form: nothing moves
 };
+
+/// How a reader is told of it.
+const char* nameOf(Truth truth);
 
 /// One scene of the chart.
 struct ScenePlan {
@@ -26,7 +29,7 @@ struct ScenePlan {
   double horizon = 0;     ///< s, trajectories are compared up to here: below the chaos horizon
   double statistics = 0;  ///< s, rates are counted for so long; 0: no statistics
   double mixing = 0;      ///< s, run before the start, so that a fluid is in equilibrium
-  Truth truth = Truth::multiprecision;
+  Truth truth = Truth::all_pairs;
   int repeats = 20;  ///< of a run at most
 };
 

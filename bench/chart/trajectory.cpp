@@ -2,29 +2,12 @@
 #include "trajectory.hpp"
 
 #include <algorithm>
-#include <boost/multiprecision/eigen.hpp>
-#include <boost/multiprecision/mpfr.hpp>
-#include <cmath>
 
 #include "ball_sim/brute_force.hpp"
-#include "ball_sim/methods.hpp"
+#include "multiprecision.hpp"
+#include "oracle.hpp"
 
 namespace ball_sim::core::chart {
-namespace {
-
-/// 77 decimal digits: a significand of 257 bits.
-using Multiprecision = boost::multiprecision::number<
-    boost::multiprecision::mpfr_float_backend<77, boost::multiprecision::allocate_stack>,
-    boost::multiprecision::et_off>;
-
-Trajectory runReference(Method& method, const PreparedScene& scene, double until) {
-  for (std::size_t i = 0; i < scene.balls.size(); ++i) {
-    method.insert(static_cast<BallId>(i), scene.balls[i]);
-  }
-  return record(method, scene, until);
-}
-
-}  // namespace
 
 Impact impactOf(BallId a, Partner b) {
   if (b >= 0 && b < static_cast<Partner>(a)) return {static_cast<BallId>(b), a};
@@ -93,20 +76,24 @@ Trajectory record(Method& method, const PreparedScene& scene, double until) {
   return trajectory;
 }
 
+Trajectory allPairsTrajectory(const PreparedScene& scene, double until) {
+  BruteForce<Multiprecision> method(scene.surroundings);
+  for (std::size_t i = 0; i < scene.balls.size(); ++i) {
+    method.insert(static_cast<BallId>(i), scene.balls[i]);
+  }
+  return record(method, scene, until);
+}
+
 Trajectory trueTrajectory(const PreparedScene& scene, double until) {
   switch (scene.plan.truth) {
     case Truth::at_rest:
       return {scene.balls, Vector3::Zero()};
-    case Truth::long_double: {
-      MethodSettings settings;
-      settings.precision = Precision::long_double;
-      return runReference(*makeMethod("event_driven", scene.surroundings, settings), scene, until);
-    }
-    case Truth::multiprecision:
+    case Truth::oracle:
+      return oracleTrajectory(scene, until);
+    case Truth::all_pairs:
       break;
   }
-  BruteForce<Multiprecision> method(scene.surroundings);
-  return runReference(method, scene, until);
+  return allPairsTrajectory(scene, until);
 }
 
 }  // namespace ball_sim::core::chart

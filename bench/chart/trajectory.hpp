@@ -69,6 +69,10 @@ class Trajectory {
 /// @param method  holds the balls, ids from 0, at date 0
 Trajectory record(Method& method, const PreparedScene& scene, double until);
 
+/// All pairs at every event in 256-bit arithmetic, by the templates of method brute_force.
+/// @param until  s
+Trajectory allPairsTrajectory(const PreparedScene& scene, double until);
+
 /// The truth about a scene up to its horizon. @param until  s
 Trajectory trueTrajectory(const PreparedScene& scene, double until);
 
