@@ -135,7 +135,9 @@ TEST(Limits, OverlapsOfDiscreteAreAStepDeep) {
 }
 
 TEST(Limits, AHitDeepInsideGainsNothing) {  // a velocity bias would part them faster
-  for (const char* name : {"discrete"}) {
+  std::vector<std::string> names = exactMethods();
+  names.push_back("discrete");
+  for (const std::string& name : names) {
     TestScene scene;
     scene.balls = {{Vector3(-0.2, 0, 0), Vector3(1, 0, 0), 0.5, 1},
                    {Vector3(0.2, 0, 0), Vector3(-1, 0, 0), 0.5, 1}};
@@ -143,6 +145,58 @@ TEST(Limits, AHitDeepInsideGainsNothing) {  // a velocity bias would part them f
     run.advanceTo(2);
     EXPECT_EQ(run.velocity(0), Vector3(-1, 0, 0));
     EXPECT_EQ(run.velocity(1), Vector3(1, 0, 0));
+  }
+}
+
+// After one step their centres are the same, and there is no line of centres to part along.
+TEST(Limits, CoincidentCentresAfterAStepStayFinite) {
+  for (const char* name : {"discrete", "soft_sphere"}) {
+    TestScene scene;
+    scene.balls = {{Vector3(-1, 0, 0), Vector3(1, 0, 0), 0.5, 1},
+                   {Vector3(1, 0, 0), Vector3(-1, 0, 0), 0.5, 1}};
+    Trial run(name, scene, stepsOf(1));
+    run.advanceTo(1);
+    ASSERT_EQ(run.position(0), run.position(1)) << name;
+    run.advanceTo(100);
+    EXPECT_TRUE(run.position(0).allFinite() && run.position(1).allFinite()) << name;
+    EXPECT_EQ(Vector3(run.velocity(0) + run.velocity(1)), Vector3(0, 0, 0)) << name;
+    EXPECT_LE(double(kineticEnergyOf(scene, run.states())), 1 + 1e-15) << name;
+  }
+}
+
+// Spheres in a close-packed lattice with gaps of a share of their diameter meet as often as the
+// gaps are small: an event-driven method's simulated time an event goes to nothing with them.
+TEST(Limits, NearClosePackingTheEventsOfASecondHaveNoBound) {
+  constexpr int kCells = 3;  // along an edge, of four balls each
+  constexpr std::uint64_t kEvents = 40000;
+  for (const std::string& name : fastMethods()) {
+    std::vector<double> reached;  // s, over the gap
+    for (const double gap : {1e-3, 1e-6}) {
+      RandomNumbers random(4);
+      TestScene scene;
+      const double cell = std::sqrt(2) * (1 + gap);  // m, of balls with a diameter of 1 m
+      scene.surroundings.periodic = true;
+      scene.surroundings.box = {Vector3::Zero(), Vector3::Constant(kCells * cell)};
+      for (int i = 0; i < kCells * kCells * kCells; ++i) {
+        const Vector3 corner(i % kCells, i / kCells % kCells, i / (kCells * kCells));
+        for (const Vector3& place :
+             {Vector3(0, 0, 0), Vector3(0, 0.5, 0.5), Vector3(0.5, 0, 0.5), Vector3(0.5, 0.5, 0)}) {
+          scene.balls.push_back({cell * (corner + place), random.gaussianVector(1), 0.5, 1});
+        }
+      }
+      Trial run(name, scene);
+      run.log().capacity = 0;
+      ASSERT_FALSE(run.method().advanceTo(Time::fromSeconds(1000), kEvents)) << name;
+      reached.push_back(run.method().now().seconds() / gap);
+      EXPECT_GT(run.method().statistics().ball_collisions, kEvents / 4) << name;
+      EXPECT_LT(run.method().statistics().deepest_overlap, 1e-10) << name;
+      EXPECT_NEAR(double(kineticEnergyOf(scene, run.states()) /
+                         kineticEnergyOf(scene, Trial(name, scene).states())),
+                  1, 1e-12);
+    }
+    // In proportion, but for what events are spent on besides impacts.
+    EXPECT_GT(reached[0], 0) << name;
+    EXPECT_NEAR(reached[1] / reached[0], 1, 0.5) << name;
   }
 }
 
@@ -268,6 +322,47 @@ TEST(Limits, PlacesFarAwayLoseOnlyTheirUlps) {
       // An ulp of 1e6 is 1e-10; each of 250 steps rounds by half of it, and impacts spread it.
       EXPECT_LT((shifted - here.position(id)).norm(), 1e-7) << name << id;
     }
+  }
+}
+
+// Steps are counted from the first insertion, whatever the date.
+TEST(Limits, LateStepsAreAsGoodAsEarlyOnes) {
+  SceneKind kind;
+  kind.count = 20;
+  const TestScene scene = randomScene(kind, 9);
+  for (const char* name : {"discrete", "soft_sphere"}) {
+    Trial early(name, scene, stepsOf(1e-3));
+    early.advanceTo(0.4997);  // between two steps
+    EXPECT_GT(early.collisions().size(), 3u);
+    Trial late(name, {scene.surroundings, {}}, stepsOf(1e-3));
+    late.advanceTo(0x1p30);
+    for (std::size_t i = 0; i < scene.balls.size(); ++i) {
+      late.method().insert(static_cast<BallId>(i), scene.balls[i]);
+    }
+    ASSERT_TRUE(late.method().advanceTo(Time::fromSeconds(0x1p30) + 0.4997, 1000000));
+    // Dates are kept as whole seconds and a rest, so not even the last bit has a reason to differ.
+    for (BallId id = 0; id < 20; ++id) {
+      EXPECT_EQ(late.position(id), early.position(id)) << name << id;
+      EXPECT_EQ(late.velocity(id), early.velocity(id)) << name << id;
+    }
+  }
+}
+
+TEST(Limits, MethodsThatTakeImpactsOneByOneRefuseToTakeThemTogether) {
+  MethodSettings together;
+  together.simultaneous_impacts = SimultaneousImpacts::simultaneous;
+  for (const char* name : {"continuous", "discrete", "soft_sphere"}) {
+    try {
+      makeMethod(name, Surroundings(), together);
+      ADD_FAILURE() << name << " took it";
+    } catch (const std::invalid_argument& error) {
+      const std::string text = error.what();
+      EXPECT_NE(text.find(name), std::string::npos) << text;
+      EXPECT_NE(text.find("event_driven can"), std::string::npos) << text;
+    }
+  }
+  for (const std::string& name : jointMethods()) {
+    EXPECT_NO_THROW(makeMethod(name, Surroundings(), together));
   }
 }
 
