@@ -25,11 +25,10 @@ namespace {
 constexpr int kFinest = 14;  // the shortest step is R/v 2^-kFinest
 constexpr int kPhases = 20;  // one fixed phase would hide an error of first order
 constexpr int kFewestPhases = 3;
-constexpr std::size_t kMany = 200;    // balls: their steps are dear, and may take
-constexpr double kManyFold = 5;       // so many times as long
-constexpr double kLongest = 6;        // s of CPU time, for one step length by one entrant
-constexpr double kLongestExact = 25;  // s of CPU time, for all runs of an entrant without a step
-constexpr double kLongestSweep = 60;  // s by the clock: then an entrant's finer steps are given up
+constexpr std::size_t kMany = 200;     // balls: their steps are dear, and may take
+constexpr double kManyFold = 5;        // so many times as long
+constexpr double kLongestExact = 25;   // s of CPU time, for all runs of an entrant without a step
+constexpr double kLongestSweep = 120;  // s by the clock: then an entrant's finer steps are given up
 
 struct Options {
   std::string source = BALL_SIM_SOURCE_DIR;
@@ -43,13 +42,15 @@ struct Options {
 struct Effort {
   double path_budget = 0.25;       // s of CPU time for one step length, by the fixed cost
   double statistics_budget = 0.6;  // s, likewise
+  double longest = 6;              // s of CPU time, for one step length by one entrant
+  double exact_budget = 4;         // s by the clock, for the repeats of an exact run
   int stride = 1;                  // of k
   int phases = kPhases;
 };
 
 Effort effortOf(const Options& options) {
   if (!options.quick) return {};
-  return {0.02, 0.1, 3, 5};
+  return {0.02, 0.1, 4, 1, 3, 5};
 }
 
 /// A scene with all that is known about it.
@@ -160,7 +161,7 @@ class Report {
       if (secondsSince(start) > kLongestSweep) {
         write(failed(one, entrant, k, "given up: longer steps took too long"));
       } else {
-        isolated(one, entrant, k, kLongest,
+        isolated(one, entrant, k, effort_.longest,
                  [&](const Sink& sink) { steppedRuns(one, entrant, k, sink); });
       }
     }
@@ -197,11 +198,17 @@ class Report {
     return std::ldexp(one.scene.reach / one.scene.plan.speed, -k);
   }
 
+  // Always the same run: as often as the median of its time is worth.
   void exactRuns(const Case& one, const Entrant& entrant, const Sink& sink) const {
     const double step = one.scene.plan.horizon / 200;
-    measurePath(one.scene, one.truth, one.scene.plan.horizon, entrant, step, 0);  // warms up
+    const Clock::time_point start = Clock::now();
+    const auto once = [&] {
+      return measurePath(one.scene, one.truth, one.scene.plan.horizon, entrant, step, 0);
+    };
+    once();  // warms up
     for (int i = 0; i < std::min(one.scene.plan.repeats, effort_.phases); ++i) {
-      sink(measurePath(one.scene, one.truth, one.scene.plan.horizon, entrant, step, 0));
+      if (i >= kFewestPhases && secondsSince(start) > effort_.exact_budget) break;
+      sink(once());
     }
     if (one.scene.plan.statistics > 0 && entrant.name != "brute_force") {  // it takes too long
       sink(measureStatistics(one.scene, one.statistics, one.scene.plan.statistics, entrant,

@@ -108,8 +108,8 @@ def draw_statistics(axes, rows):
     noise = [value(row, 'noise') for row in rows if value(row, 'noise')]
     if noise:
         axes.axhspan(5e-5, max(noise), color='#eeeeee', zorder=0)
-        axes.text(0.02, max(noise), 'below: chance, 1/√n', fontsize=7.5, color='#606060', va='top',
-                  transform=axes.get_yaxis_transform())
+        axes.text(0.98, 6e-5, 'grey: chance, 1/√n', fontsize=7.5, color='#606060', ha='right',
+                  va='bottom', transform=axes.get_yaxis_transform())
     axes.set_ylabel('relative error')
     set_heights(axes, 5e-5, 10)
 
@@ -179,7 +179,8 @@ def legend(figure, names, **where):
 def note_text(scene, rows):
     notes = ['R: the smallest sum of two radii. Each point is a time step, from the left R/v, R/2v, R/4v '
              'and so on, median of up to 20 starting phases, bars: quartiles; exact methods but '
-             'continuous have no step. The true paths: %s.' % scene['truth']]
+             'continuous have no step. Dotted: 0.01 R, and the end of the comparison. The true paths: '
+             '%s.' % scene['truth']]
     failed = failures(rows)
     if failed:
         notes.append('× failed: ' + '; '.join(failed) + '.')
@@ -196,7 +197,7 @@ def draw_scene(scene, rows, machine, path):
     (error, valid, energy), (overlap, missed, rates) = panels
     error.set_title('1a  Paths: how far off at the end')
     draw_error(error, paths)
-    valid.set_title('1b  Paths: how long they hold (dotted: to the end)')
+    valid.set_title('1b  Paths: for how long they hold')
     draw_valid_time(valid, paths, float(scene['horizon']))
     energy.set_title('2a  Energy: relative error')
     draw_lines(energy, paths, field('energy_error'))

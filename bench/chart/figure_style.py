@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt  # noqa: E402
 # Colours that colour-blind people tell apart (Okabe, Ito 2008; Tol 2021), and a sign each besides.
 LOOKS = {
     'event_driven': ('#000000', '*', 'event_driven (exact)'),
-    'auto': ('#CC3311', 'o', 'auto (a ring around what it chose)'),
+    'auto': ('#CC3311', 'o', 'auto (a ring)'),
     'brute_force': ('#777777', 'D', 'brute_force (exact)'),
     'continuous': ('#0072B2', 'o', 'continuous (exact at any step)'),
     'discrete': ('#D55E00', 's', 'discrete'),
@@ -77,5 +77,5 @@ def save(figure, path):
     figure.savefig(path, dpi=100, metadata={'Software': None})
     plt.close(figure)
     with Image.open(path) as image:
-        few = image.convert('RGB').quantize(200, method=Image.Quantize.MEDIANCUT, dither=0)
+        few = image.convert('RGB').quantize(200, kmeans=2, dither=0)
     few.save(path, optimize=True)

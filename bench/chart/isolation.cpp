@@ -18,7 +18,7 @@
 namespace ball_sim::core::chart {
 namespace {
 
-constexpr double kPatience = 4;  // s by the clock for a second of CPU time
+constexpr double kPatience = 8;  // s by the clock for a second of CPU time
 constexpr const char* kTooLong = "gave no result in time";
 
 void writeAll(int file, const std::string& text) {

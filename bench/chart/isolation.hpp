@@ -14,7 +14,7 @@ struct Outcome {
 };
 
 /// @param work     calls its argument with each line of its result, in the other process
-/// @param seconds  s of CPU time, >= 1, after which it is ended (and four times as much by the
+/// @param seconds  s of CPU time, >= 1, after which it is ended (and eight times as much by the
 /// clock)
 Outcome runIsolated(const std::function<void(const std::function<void(const std::string&)>&)>& work,
                     double seconds);

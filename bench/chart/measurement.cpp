@@ -66,7 +66,8 @@ double timeRun(const PreparedScene& scene, const Entrant& entrant, const std::ve
   const double size = static_cast<double>(steps) * static_cast<double>(balls.size());
   const bool is_short =
       entrant.kind == Kind::exact ? balls.size() <= 20 && scene.plan.repeats >= 20 : size < 1000;
-  const int copies = is_short ? 16 : 1;
+  const int many = entrant.kind == Kind::peer ? 4 : 16;  // an engine's set-up may take long
+  const int copies = is_short ? many : 1;
   std::vector<std::unique_ptr<Simulation>> runs;
   for (int i = 0; i < copies; ++i) {
     runs.push_back(entrant.make(scene.surroundings, balls, step));

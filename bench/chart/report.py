@@ -6,6 +6,7 @@ usage: report.py DATA_FOLDER > RESULTS.md
 Reads chart.csv (see summarise.py), chart_scenes.csv, chart_machine.csv, scaling.csv, and
 stability_map.csv where it is there.
 """
+import math
 import os
 import sys
 
@@ -15,6 +16,7 @@ from figure_style import value
 GAS_STEPS = [1, 2, 4, 6, 7]  # k of the steps R/v 2^-k that the gas's table shows
 TWO_BALLS_STEPS = [0, 2, 4, 6, 8, 10]
 TOLERANCE = 1e-6  # of R, what a scene without a tolerance asks of auto
+SHORTEST_RUN = 1e-5  # s of CPU time
 STACK_TOLERANCE = 0.01  # a stack hums: no method is right to 1e-6 of R
 PACKING_FRACTIONS = ['0.05', '0.2', '0.49']
 
@@ -124,18 +126,23 @@ def print_two_balls(chart):
         print('event_driven, without a step: %s\n' % short(value(exact, 'error')))
 
 
+def magnitude(row):
+    """Of the number of balls: filling by tiles leaves some out."""
+    return round(math.log10(value(row, 'balls')))
+
+
 def print_collision_costs(scaling):
     print('## Cost of a collision\n')
     print('Periodic cube, equal spheres, in equilibrium, random order in memory: microseconds per '
           'ball-ball collision, median of 3.\n')
-    counts = sorted({row['balls'] for row in scaling}, key=float)
+    counts = sorted({magnitude(row) for row in scaling})
     rows = []
     for method in sorted({row['method'] for row in scaling}, key=style.order):
         for fraction in PACKING_FRACTIONS:
-            cost = {row['balls']: value(row, 'ns_per_collision') / 1000 for row in scaling
+            cost = {magnitude(row): value(row, 'ns_per_collision') / 1000 for row in scaling
                     if row['method'] == method and float(row['packing_fraction']) == float(fraction)}
             rows.append([method, fraction] + [short(cost.get(n), 3) for n in counts])
-    print_table(['', 'packing fraction'] + counts, rows)
+    print_table(['', 'packing fraction'] + ['10^%d' % n for n in counts], rows)
 
 
 def cheapest(chart, scene, names, tolerance):
@@ -148,8 +155,9 @@ def cheapest(chart, scene, names, tolerance):
 
 def print_auto(chart, scenes):
     print('## auto beside the cheapest method that is right\n')
-    print('CPU seconds per simulated second up to the horizon, set-up apart. Right: to %g of R; the '
-          'stack: to %g.\n' % (TOLERANCE, STACK_TOLERANCE))
+    print('CPU time of the run up to the horizon, set-up apart. Right: to %g of R; the stack: to %g. '
+          'Runs of less than %g us\ndo not count: there it is the calls that cost.\n' %
+          (TOLERANCE, STACK_TOLERANCE, SHORTEST_RUN * 1e6))
     rows = []
     for scene in scenes:
         name = scene['scene']
@@ -160,11 +168,16 @@ def print_auto(chart, scenes):
         fast = ['event_driven', 'continuous', 'discrete', 'soft_sphere']
         cost, best = cheapest(chart, name, fast, tolerance)
         plain, _ = cheapest(chart, name, ['brute_force'], tolerance)
-        rows.append([name, short(value(auto, 'cost'), 3), short(value(auto, 'error')),
-                     '%s %s' % (best, short(cost, 3)),
-                     '%.2f' % (value(auto, 'cost') / cost) if cost else '-', short(plain, 3)])
-    print_table(['scene', 'auto', 'its error / R', 'cheapest', 'auto / cheapest',
-                 'brute_force, for comparison'], rows)
+        if not cost:
+            continue
+        whole = cost * float(scene['horizon'])  # s
+        ratio = '%.2f' % (value(auto, 'cost') / cost)
+        rows.append([name, '%.3g' % (1e6 * value(auto, 'cost') * float(scene['horizon'])),
+                     short(value(auto, 'error')), best, '%.3g' % (1e6 * whole),
+                     ratio if whole >= SHORTEST_RUN else '(%s)' % ratio,
+                     '%.3g' % (1e6 * plain * float(scene['horizon'])) if plain else '-'])
+    print_table(['scene', 'auto, us', 'its error / R', 'cheapest', 'us', 'auto / cheapest',
+                 'brute_force, us, no choice of auto'], rows)
 
 
 def print_truths(scenes):
@@ -180,6 +193,16 @@ def print_quoted(chart, scaling, stability):
     if exact:
         print('- doc/method.md, event_driven: energy error %s, overlaps %s R in box_gas' %
               (short(value(exact, 'energy_error')), short(value(exact, 'overlap'))))
+    pair = [chart.one(part='path', scene='two_balls', entrant='discrete', k=k) for k in (0, 6, 10)]
+    if all(pair):
+        print('- doc/method.md, discrete: two balls that meet once are ' + ', '.join(
+            '%s R off at %s s' % (short(value(row, 'error')), short(value(row, 'step')))
+            for row in pair))
+    coarse = chart.one(entrant='discrete', k=1, **gas)
+    if coarse:
+        print('- doc/method.md, discrete: %s instead of %s collisions a second at a step of %s s' % (
+            short(value(coarse, 'rate'), 3), short(value(coarse, 'true_rate'), 3),
+            short(value(coarse, 'step'))))
     soft = [value(row, 'step') for row in chart.some(entrant='soft_sphere', **gas)
             if mostly_failed(row)]
     if soft:
@@ -196,7 +219,7 @@ def print_quoted(chart, scaling, stability):
               short(value(stack, 'error')))
     large = [value(row, 'ns_per_collision') for row in scaling
              if row['method'] == 'continuous' and row['packing_fraction'] == '0.05' and
-             row['balls'] == '1000000']
+             magnitude(row) == 6]
     if large:
         print('- doc/performance.md: continuous at 0.05 and 10^6 balls: %.0f k/s' % (1e6 / large[0]))
     for method in ('discrete', 'soft_sphere'):
