@@ -11,7 +11,7 @@ import sys
 import textwrap
 
 import figure_style as style
-from figure_style import plt, value
+from figure_style import mostly_failed, plt, value
 
 COST = 'CPU seconds per simulated second'
 FLOOR = 1e-17  # a double's last bit; zeros are drawn here
@@ -26,10 +26,6 @@ def lines(rows):
             groups[row['entrant']].append(row)
     for name in sorted(groups, key=style.order):
         yield name, sorted(groups[name], key=lambda row: int(row['k']))
-
-
-def mostly_failed(row):
-    return int(row['failed']) * 2 >= int(row['runs'])
 
 
 def draw_lines(axes, rows, measure, floor=FLOOR, hollow=False, lower=None, upper=None):

@@ -71,6 +71,11 @@ def value(row, field):
     return float(row[field]) if row.get(field) else None
 
 
+def mostly_failed(row):
+    """Whether a row of chart.csv is of no use."""
+    return int(row['failed']) * 2 >= int(row['runs'])
+
+
 def save(figure, path):
     """A PNG of few colours: pictures of lines lose nothing by it, and shrink threefold."""
     from PIL import Image

@@ -11,7 +11,7 @@ import os
 import sys
 
 import figure_style as style
-from figure_style import value
+from figure_style import mostly_failed, value
 
 GAS_STEPS = [1, 2, 4, 6, 7]  # k of the steps R/v 2^-k that the gas's table shows
 TWO_BALLS_STEPS = [0, 2, 4, 6, 8, 10]
@@ -33,10 +33,6 @@ def print_table(header, rows):
     print()
 
 
-def mostly_failed(row):
-    return int(row['failed']) * 2 >= int(row['runs'])
-
-
 class Chart:
     """The rows of chart.csv."""
 
@@ -52,10 +48,6 @@ class Chart:
 
     def entrants(self, scene):
         return sorted({row['entrant'] for row in self.some(scene=scene)}, key=style.order)
-
-    def worst(self, field, **wanted):
-        return max((value(r, field) for r in self.some(**wanted) if value(r, field) is not None),
-                   default=None)
 
 
 def print_head(machine):
