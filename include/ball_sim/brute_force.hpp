@@ -365,7 +365,8 @@ class BruteForce final : public Method {
     keepApproaching(cluster.bodies, cluster.contacts);
     if (cluster.contacts.size() < 2) return false;
     const Real e = recordImpacts(cluster) ? Real(1) : Real(surroundings_.restitution);
-    if (orderMatters<Real>(cluster.bodies, cluster.contacts, Real(surroundings_.restitution))) {
+    if (orderMatters<Real>(cluster.bodies, cluster.contacts, gravity_,
+                           Real(surroundings_.restitution))) {
       ++statistics_.ambiguous_impacts;
     }
     reflectTogether(cluster.bodies, cluster.contacts, e);
@@ -535,7 +536,7 @@ class BruteForce final : public Method {
   std::vector<Body> bodies_;  // ids ascending
   Time base_;                 // now() is base_ + elapsed_
   Real elapsed_ = 0;          // s
-  OrderWatch<Real> watch_;
+  OrderWatch<Real> watch_{surroundings_.gravity};
   Statistics statistics_;
   CollisionLog* log_ = nullptr;
 };

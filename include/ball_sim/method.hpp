@@ -50,7 +50,8 @@ struct Statistics {
   double elastic_energy = 0;    ///< J: held by the springs of soft contacts now
   std::size_t queue_depth = 0;  ///< events that wait
   std::size_t bytes = 0;        ///< memory held for balls, cells and queue
-  /// Impacts at one instant whose outcome the policy (SimultaneousImpacts) decided.
+  /// Impacts at one instant whose outcome the policy (SimultaneousImpacts) decided; without those
+  /// of contacts that come to rest, see settles().
   std::uint64_t ambiguous_impacts = 0;
 };
 

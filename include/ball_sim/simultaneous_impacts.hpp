@@ -71,6 +71,26 @@ bool orderMatters(const VectorOf<Real>& n_a, const VectorOf<Real>& n_b, Real w, 
   return abs(k - floor(k + Real(0.5))) > tolerance * k * k;
 }
 
+/// Whether a contact is coming to rest: gravity presses its partners together, itself or through
+/// others, and they are too slow to rise by a thousandth of their reach. What another order of such
+/// impacts changes nobody sees. Along a level normal nothing presses: balls that roll towards each
+/// other do not settle, however slow.
+/// @param gravity  m/s^2
+/// @param normal   unit, of the contact
+/// @param speed    m/s, of approach, >= 0
+/// @param reach    m, sum of radii, or the radius at a wall
+template <class Real>
+bool settles(const VectorOf<Real>& gravity, const VectorOf<Real>& normal, Real speed, Real reach,
+             Real restitution) {
+  using std::abs;
+  using std::sqrt;
+  constexpr double kSettledHeight = 1e-3;  // of the reach
+  constexpr double kLevel = 1e-9;          // of gravity, along the normal
+  const Real g = sqrt(dot(gravity, gravity));
+  return restitution < 1 && speed * speed <= 2 * g * Real(kSettledHeight) * reach &&
+         abs(dot(gravity, normal)) > Real(kLevel) * g;
+}
+
 /// A ball of a cluster.
 template <class Real>
 struct ClusterBody {
@@ -121,11 +141,17 @@ void keepApproaching(const std::vector<ClusterBody<Real>>& bodies,
                  contacts.end());
 }
 
-/// Whether the policy decides the outcome: two of the contacts that approach share a ball, and
-/// their order would matter.
+/// Whether the policy decides the outcome: two of the contacts that approach share a ball, neither
+/// settles, and their order would matter.
+/// @param gravity  m/s^2
 template <class Real>
 bool orderMatters(const std::vector<ClusterBody<Real>>& bodies,
-                  const std::vector<ClusterContact<Real>>& contacts, Real restitution) {
+                  const std::vector<ClusterContact<Real>>& contacts, const VectorOf<Real>& gravity,
+                  Real restitution) {
+  const auto isSettling = [&](const ClusterContact<Real>& contact) {
+    return settles<Real>(gravity, contact.normal, contact.approach_speed, contact.reach,
+                         restitution);
+  };
   const auto partnerAt = [&](const ClusterContact<Real>& contact, std::size_t shared) {
     const std::size_t partner = contact.a == shared ? contact.b : contact.a;
     return partner == ClusterContact<Real>::kWall ? Real(0) : bodies[partner].w;
@@ -135,6 +161,7 @@ bool orderMatters(const std::vector<ClusterBody<Real>>& bodies,
   };
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     for (std::size_t j = i + 1; j < contacts.size(); ++j) {
+      if (isSettling(contacts[i]) || isSettling(contacts[j])) continue;
       for (const std::size_t shared : {contacts[i].a, contacts[i].b}) {
         if (shared == ClusterContact<Real>::kWall) continue;
         if (contacts[j].a != shared && contacts[j].b != shared) continue;
@@ -433,6 +460,9 @@ class OrderWatch {
   using Vec = VectorOf<Real>;
 
  public:
+  /// @param gravity  m/s^2
+  explicit OrderWatch(const Vector3& gravity) : gravity_(gravity.cast<Real>()) {}
+
   /// The key of a wall, beyond all ids of balls.
   static constexpr std::uint64_t wallKey(std::size_t index) {
     return (std::uint64_t{1} << 32) + index;
@@ -451,16 +481,16 @@ class OrderWatch {
   /// @param approach_speed  m/s, > 0
   /// @param reach   m, sum of radii, or the radius at a wall
   /// @return true when another impact of this instant shares a ball with it, approached at the same
-  ///         time, and would have led elsewhere had it come later
+  ///         time, and would have led elsewhere had it come later; not where one of the two settles
   bool note(Real now, const Side& a, const Side& b, const Vec& normal, Real approach_speed,
             Real reach, Real restitution) {
     using std::abs;
     if (abs(now - instant_) * approach_speed <= Real(kTouchSlack) * reach) {
-      return noteAnother(now, a, b, normal, approach_speed, restitution);
+      return noteAnother(now, a, b, normal, approach_speed, reach, restitution);
     }
     instant_ = now;
     count_ = 1;
-    impacts_[0] = {a.key, b.key, a.w, b.w, a.change, b.change, normal};
+    impacts_[0] = {a.key, b.key, a.w, b.w, a.change, b.change, approach_speed, reach, normal};
     return false;
   }
 
@@ -472,19 +502,22 @@ class OrderWatch {
     std::uint64_t a, b;
     Real w_a, w_b;            // 1/kg
     Real change_a, change_b;  // m/s
+    Real speed;               // m/s, of approach
+    Real reach;               // m
     Vec normal;               // from a to b
   };
 
   // Rare, so it is kept out of the callers' code.
   __attribute__((noinline)) bool noteAnother(Real now, const Side& a, const Side& b,
-                                             const Vec& normal, Real approach_speed,
+                                             const Vec& normal, Real approach_speed, Real reach,
                                              Real restitution) {
     if (now != instant_ && !(approach_speed > rounding(a.v, b.v, normal))) {
       return false;  // not of this instant, but slow
     }
-    const bool matters = dependsOnOrder(a, b, normal, restitution);
+    const bool matters = dependsOnOrder(a, b, normal, reach, restitution);
     if (count_ < impacts_.size()) {
-      impacts_[count_++] = {a.key, b.key, a.w, b.w, a.change, b.change, normal};
+      impacts_[count_++] = {a.key,    b.key,          a.w,   b.w,   a.change,
+                            b.change, approach_speed, reach, normal};
     }
     return matters;
   }
@@ -495,7 +528,8 @@ class OrderWatch {
   }
 
   // Undoes the impacts of this instant, last one first: did both approach before the other came?
-  bool dependsOnOrder(const Side& a, const Side& b, const Vec& normal, Real restitution) const {
+  bool dependsOnOrder(const Side& a, const Side& b, const Vec& normal, Real reach,
+                      Real restitution) const {
     Vec v_a = a.v + a.change * normal;
     Vec v_b = b.v - b.change * normal;
     const auto undo = [](const Impact& impact, std::uint64_t key, Vec& v) {
@@ -509,7 +543,10 @@ class OrderWatch {
       const bool shares_a = a.key == past.a || a.key == past.b;
       const bool shares_b = b.key == past.a || b.key == past.b;
       if (shares_a == shares_b) continue;  // none, or the same two
-      if (!(dot(v_a, normal) - dot(v_b, normal) > rounding(v_a, v_b, normal))) continue;
+      const Real speed = dot(v_a, normal) - dot(v_b, normal);
+      if (!(speed > rounding(v_a, v_b, normal))) continue;
+      if (settles<Real>(gravity_, normal, speed, reach, restitution)) continue;
+      if (settles<Real>(gravity_, past.normal, past.speed, past.reach, restitution)) continue;
       const std::uint64_t shared = shares_a ? a.key : b.key;
       const Vec here = shares_a ? normal : Vec(-normal);
       const Vec there = shared == past.a ? past.normal : Vec(-past.normal);
@@ -521,6 +558,7 @@ class OrderWatch {
     return false;
   }
 
+  Vec gravity_;  // m/s^2
   std::array<Impact, 32> impacts_;
   std::size_t count_ = 0;
   Real instant_ = -std::numeric_limits<Real>::infinity();  // s

@@ -187,6 +187,43 @@ TEST_P(Policies, restitutionHoldsAtEveryContact) {
   EXPECT_NEAR(run.velocity(1).norm(), speed, 1e-15);
 }
 
+// Radii 0.5 m and gravity 10 m/s^2: a thousandth of the reach is a rise at 0.14 m/s.
+TEST_P(Policies, contactsThatComeToRestAreNotCounted) {
+  const auto ambiguous = [&](double speed, const Vector3& gravity, double restitution,
+                             SimultaneousImpacts policy) {
+    TestScene scene = row({1, 2, 1}, {speed, 0, -speed});
+    scene.surroundings.gravity = gravity;
+    scene.surroundings.restitution = restitution;
+    return after(scene, policy).method().statistics().ambiguous_impacts;
+  };
+  const Vector3 along(-10, 0, 0);
+  const Vector3 across(0, 0, -10);
+  for (const auto policy : {kSequential, kSimultaneous}) {
+    EXPECT_GT(ambiguous(0.2, along, 0.5, policy), 0u);
+    EXPECT_EQ(ambiguous(0.1, along, 0.5, policy), 0u);
+    EXPECT_EQ(ambiguous(0.1, Vector3(-1e-3, 0, -10), 0.5, policy), 0u) << "pressed by others";
+    EXPECT_GT(ambiguous(0.1, along, 1, policy), 0u) << "elastic balls never rest";
+    EXPECT_GT(ambiguous(0.001, across, 0.5, policy), 0u) << "they roll towards each other";
+    EXPECT_GT(ambiguous(0.001, Vector3::Zero(), 0.5, policy), 0u);
+  }
+}
+
+// What is left of a bounce is not enough to count, however hard the other impact is.
+TEST_P(Policies, aHardImpactBesideOneThatComesToRestIsNotCounted) {
+  for (const double slow : {0.1, 0.2}) {
+    TestScene scene = row({1, 2, 1}, {3, 0, -slow});
+    scene.surroundings.gravity = Vector3(-10, 0, 0);
+    scene.surroundings.restitution = 0.5;
+    const std::uint64_t count = after(scene, kSequential).method().statistics().ambiguous_impacts;
+    EXPECT_EQ(count > 0, slow > 0.15) << slow;
+    std::swap(scene.balls[0].velocity, scene.balls[2].velocity);
+    scene.balls[0].velocity *= -1;
+    scene.balls[2].velocity *= -1;
+    const std::uint64_t other = after(scene, kSequential).method().statistics().ambiguous_impacts;
+    EXPECT_EQ(other > 0, slow > 0.15) << slow;
+  }
+}
+
 TEST_P(Policies, impactsAnUlpApartAreOneInstant) {
   // The cue ball flies a way that rounds: without a tolerance one side would be hit first.
   for (const double angle : {0.0, 0.3, 1.1, 2.5}) {
@@ -377,7 +414,7 @@ TEST(OrderMatters, exactlyWhereTheAngleIsNoWholePartOfPi) {
 TEST(OrderWatch, seesThatBothApproachedAtOnce) {
   const Vector3 x = Vector3::UnitX();
   const Vector3 at[] = {-x / 3, 2 * x / 3, -4 * x / 9, 11 * x / 9, 2 * x / 9, 8 * x / 9};
-  OrderWatch<double> watch;
+  OrderWatch<double> watch(Vector3::Zero());
   // Masses (1, 2, 1) meet from left to right. The first impact leaves ball 0 at -1/3, ball 1 at
   // 2/3.
   const auto first = [&](double date) {

@@ -1463,7 +1463,7 @@ class Continuous final : public Method {
   bool era_is_stale_ = true;
   Real now_ = 0;  // s, in this era
   Time reached_;  // what now() tells
-  OrderWatch<Real> watch_;
+  OrderWatch<Real> watch_{surroundings_.gravity};
   Statistics statistics_;
   CollisionLog* log_ = nullptr;
 };

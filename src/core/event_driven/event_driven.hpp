@@ -758,7 +758,7 @@ class EventDriven final : public Method {
     Cluster cluster = clusterAround(slot, other);
     keepApproaching(cluster.bodies, cluster.contacts);
     if (cluster.contacts.size() < 2) return false;
-    if (orderMatters<Real>(cluster.bodies, cluster.contacts, restitution_)) {
+    if (orderMatters<Real>(cluster.bodies, cluster.contacts, space_.fall, restitution_)) {
       ++statistics_.ambiguous_impacts;
     }
     const Real e = recordImpacts(cluster) ? Real(1) : restitution_;
@@ -1223,7 +1223,7 @@ class EventDriven final : public Method {
   Real now_ = 0;  // s, in this year
   Time reached_;  // what now() tells
   std::uint64_t events_at_new_year_ = 0;
-  OrderWatch<Real> watch_;
+  OrderWatch<Real> watch_{surroundings_.gravity};
   Statistics statistics_;
   CollisionLog* log_ = nullptr;
 };
