@@ -45,6 +45,9 @@ MethodChoice chooseMethod(const std::string& name, const Scene& scene,
 /// @throws std::invalid_argument  a time step, s, that is not finite or not above 0
 void checkTimeStep(double time_step);
 
+/// @throws std::invalid_argument  a tolerance, of a radius, that is not above 0 or above 1
+void checkTolerance(double tolerance);
+
 /// @param name  a known name other than `auto`
 /// @throws std::invalid_argument  an unknown name; a time step the method can't go by
 std::unique_ptr<Method> makeMethod(const std::string& name, const Surroundings& surroundings,

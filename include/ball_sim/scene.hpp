@@ -38,7 +38,7 @@ struct Scene {
   std::vector<Ball> balls;
   std::vector<Fill> fill;
   std::string method = "auto";
-  double time_step = 1e-3;          ///< s, for the stepping methods
+  std::optional<double> time_step;  ///< s, for the stepping methods; absent: one that fits
   std::optional<double> tolerance;  ///< relative to a radius; absent: as exact as can be
   SimultaneousImpacts simultaneous_impacts = SimultaneousImpacts::sequential;
 };

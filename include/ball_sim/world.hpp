@@ -31,6 +31,7 @@ struct SpawnResult {
 struct WorldOptions {
   std::string method;               ///< overrides the scene's; empty: the scene's
   std::optional<double> time_step;  ///< s, overrides the scene's
+  std::optional<double> tolerance;  ///< of a radius, 0..1, overrides the scene's
   Precision precision = Precision::double_precision;
   unsigned threads = 1;  ///< >= 1, for the methods that can share their work
   std::size_t max_balls = 10'000'000;
@@ -39,8 +40,8 @@ struct WorldOptions {
 class World {
  public:
   /// Fills the scene and sets the clock to 0.
-  /// @throws PackingError, std::invalid_argument (method, time step), Refused (a listed ball, named
-  /// by index; more balls than max_balls)
+  /// @throws PackingError, std::invalid_argument (method, time step, tolerance), Refused (a listed
+  /// ball, named by index; more balls than max_balls)
   explicit World(const Scene& scene, const WorldOptions& options = {});
 
   // --- time

@@ -23,7 +23,7 @@ namespace {
 void refuseJointImpacts(const std::string& name, const MethodSettings& settings) {
   if (settings.simultaneous_impacts == SimultaneousImpacts::sequential) return;
   throw std::invalid_argument("simultaneous_impacts: 'simultaneous': method " + name +
-                              " cannot take impacts together; event_driven can");
+                              " cannot take impacts together; event_driven and brute_force can");
 }
 
 }  // namespace
@@ -43,6 +43,12 @@ void checkTimeStep(double time_step) {
   if (time_step > 0 && std::isfinite(time_step)) return;
   throw std::invalid_argument("time_step: " + formatNumber(time_step) +
                               ": must be a finite number of seconds above 0");
+}
+
+void checkTolerance(double tolerance) {
+  if (tolerance > 0 && tolerance <= 1) return;
+  throw std::invalid_argument("tolerance: " + formatNumber(tolerance) +
+                              ": must be a share of a radius above 0, at most 1");
 }
 
 std::unique_ptr<Method> makeMethod(const std::string& name, const Surroundings& surroundings,

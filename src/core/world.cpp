@@ -11,6 +11,7 @@
 #include "ball_sim/observables.hpp"
 #include "ball_sim/overlap_index.hpp"
 #include "ball_sim/text.hpp"
+#include "fitting_step.hpp"
 #include "soft_sphere/contact_spring.hpp"
 
 namespace ball_sim::core {
@@ -58,8 +59,10 @@ Refusal unknownBall(const std::string& ids, bool several) {
 
 World::World(const Scene& scene, const WorldOptions& options) : scene_(scene), options_(options) {
   if (!options_.method.empty()) scene_.method = options_.method;
-  if (options_.time_step) scene_.time_step = *options_.time_step;
-  checkTimeStep(scene_.time_step);
+  if (options_.time_step) scene_.time_step = options_.time_step;
+  if (options_.tolerance) scene_.tolerance = options_.tolerance;
+  if (scene_.time_step) checkTimeStep(*scene_.time_step);
+  if (scene_.tolerance) checkTolerance(*scene_.tolerance);
   checkMethodName(scene_.method);
   std::size_t count = scene_.balls.size();
   for (const Fill& fill : scene_.fill) count += fill.count;
@@ -73,7 +76,8 @@ World::World(const Scene& scene, const WorldOptions& options) : scene_(scene), o
 void World::build(Time start) {
   MethodSettings settings;
   settings.precision = options_.precision;
-  settings.time_step = scene_.time_step;
+  settings.time_step = scene_.time_step.value_or(
+      fittingTimeStep(scene_.method, initial_, scene_.surroundings, scene_.tolerance));
   settings.tolerance = scene_.tolerance;
   if (scene_.tolerance) {
     settings.contact_time = contactTimeFor(*scene_.tolerance, initial_, scene_.surroundings);

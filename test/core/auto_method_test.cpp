@@ -24,7 +24,7 @@ class AutoRun {
  public:
   explicit AutoRun(Scene scene) : balls_(populate(scene)) {
     MethodSettings settings;
-    settings.time_step = scene.time_step;
+    settings.time_step = scene.time_step.value_or(1e-3);
     settings.tolerance = scene.tolerance;
     settings.simultaneous_impacts = scene.simultaneous_impacts;
     const MethodChoice choice = chooseMethod("auto", scene, balls_);

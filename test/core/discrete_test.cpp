@@ -244,6 +244,31 @@ TEST(Discrete, WarnsOfBallsThatMoveTooFarInAStep) {
   EXPECT_NE(warning.find("time_step of 0.01 s"), std::string::npos) << warning;
 }
 
+/// Two balls of radius 0.1 m on each other on the floor, g = 10 m/s^2; sqrt(r/g) = 0.1 s.
+std::string warningOfAStack(double time_step, double restitution) {
+  TestScene scene{floorUnderGravity(10, restitution), {}};
+  for (const double z : {0.1, 0.3}) {
+    scene.balls.push_back({Vector3(0, 0, z), Vector3::Zero(), 0.1, 1});
+  }
+  Trial run = discrete(scene, time_step);
+  run.advanceTo(0.5);
+  return run.method().warning();
+}
+
+TEST(Discrete, WarnsOfStepsThatAreTooLongForAPile) {
+  EXPECT_EQ(warningOfAStack(0.0049, 0.5), "");
+  const std::string warning = warningOfAStack(0.0051, 0.5);
+  EXPECT_NE(warning.find("balls of radius 0.1 m that lie on others come to rest late"),
+            std::string::npos)
+      << warning;
+  EXPECT_NE(warning.find("take one of 0.005 s or less"), std::string::npos) << warning;
+  EXPECT_EQ(warningOfAStack(0.0051, 1), "") << "nothing rests";
+  TestScene scene{floorUnderGravity(10, 0.5), {{Vector3(0, 0, 0.1), Vector3::Zero(), 0.1, 1}}};
+  Trial alone = discrete(scene, 0.0051);
+  alone.advanceTo(0.5);
+  EXPECT_EQ(alone.method().warning(), "") << "one ball on the floor is no pile";
+}
+
 }  // namespace
 }  // namespace test
 }  // namespace ball_sim::core

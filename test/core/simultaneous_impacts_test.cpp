@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <stdexcept>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -373,6 +374,19 @@ TEST_P(Policies, randomTouchingClustersConserveAndPart) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, Policies, testing::ValuesIn(jointMethods()), methodOf);
+
+TEST(RefusedPolicies, methodsThatTakeNoImpactsTogetherNameThoseThatDo) {
+  for (const char* name : {"continuous", "discrete", "soft_sphere"}) {
+    try {
+      makeMethod(name, {}, settingsOf(kSimultaneous));
+      ADD_FAILURE() << name;
+    } catch (const std::invalid_argument& refused) {
+      EXPECT_EQ(std::string(refused.what()),
+                "simultaneous_impacts: 'simultaneous': method " + std::string(name) +
+                    " cannot take impacts together; event_driven and brute_force can");
+    }
+  }
+}
 
 // --- the pure functions
 

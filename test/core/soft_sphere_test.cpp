@@ -132,7 +132,7 @@ TEST(SoftSphere, StepsAboveATenthOfTheContactTimeAreRefused) {
   } catch (const std::invalid_argument& refused) {
     EXPECT_STREQ(refused.what(),
                  "time_step: 0.2: soft_sphere needs at most a tenth of the contact time, 0.1 s, to "
-                 "keep the energy of an impact");
+                 "keep the energy of an impact; without a time_step a scene gets one that fits");
   }
 }
 
@@ -161,6 +161,55 @@ TEST(SoftSphere, TheTolerancesContactTimeKeepsOverlapsWithinIt) {
   world.advanceTo(Time::fromSeconds(2));
   const std::string warning = world.warning();
   EXPECT_NE(warning.find("more than the tolerance of 0.02"), std::string::npos) << warning;
+}
+
+/// A ball of 10 m/s in a closed box of 2 m.
+Scene fastInABox() {
+  Scene scene;
+  scene.method = "soft_sphere";
+  scene.surroundings.box = {Vector3::Zero(), Vector3::Constant(2)};
+  scene.balls = {{Vector3::Constant(1), Vector3(10, 1, 0.3), 0.05, 1}};
+  return scene;
+}
+
+TEST(SoftSphere, WithoutATimeStepASceneGetsOneThatFits) {
+  for (const bool named : {false, true}) {
+    Scene scene = fastInABox();
+    if (named) scene.tolerance = 0.02;
+    const double tolerance = named ? 0.02 : 0.1;
+    World world(scene);
+    world.advanceTo(Time::fromSeconds(1));
+    const double overlap = world.statistics().deepest_overlap / 0.05;
+    EXPECT_LT(overlap, tolerance) << "made for two of it, head-on";
+    EXPECT_GT(overlap, 0.4 * tolerance) << "a wall: half of that";
+    EXPECT_EQ(world.warning(), "");
+    EXPECT_GE(world.ball(0).position.x(), 0.045);
+    EXPECT_LE(world.ball(0).position.x(), 1.955);
+  }
+}
+
+TEST(SoftSphere, SaysThatBallsWentThroughAWall) {
+  Scene scene = fastInABox();
+  scene.time_step = 1e-3;  // contacts of 50 ms, in which the ball flies half a metre
+  World world(scene);
+  world.advanceTo(Time::fromSeconds(0.112));
+  EXPECT_LT(1.95, world.ball(0).position.x());
+  EXPECT_NE(world.warning().find("went through walls"), std::string::npos) << world.warning();
+}
+
+TEST(SoftSphere, WarnsOfBallsThatPassedUnseen) {
+  Scene scene = fastInABox();
+  scene.balls[0].velocity = Vector3(10, 0, 0);
+  scene.balls[0].position.x() = 0.2;
+  scene.balls.push_back({Vector3(0.5, 1, 1), Vector3::Zero(), 0.05, 1});
+  scene.time_step = 0.04;  // 0.4 m: over the other ball at once
+  World world(scene);
+  EXPECT_EQ(world.warning(), "");
+  world.advanceTo(Time::fromSeconds(0.1));
+  EXPECT_EQ(world.statistics().ball_collisions, 0u);
+  const std::string warning = world.warning();
+  EXPECT_NE(warning.find("moved by 8 of its radius"), std::string::npos) << warning;
+  EXPECT_NE(warning.find("unseen"), std::string::npos) << warning;
 }
 
 TEST(SoftSphere, TheContactTimeKnowsOfFallsAndOfStillness) {

@@ -311,5 +311,24 @@ TEST(World, RefusesUnknownMethodsAndTimeSteps) {
   EXPECT_THROW(World(oneBallInABox(), options), std::invalid_argument);
 }
 
+TEST(World, TakesAToleranceInPlaceOfTheScenes) {
+  Scene scene = oneBallInABox();
+  EXPECT_FALSE(World(scene).scene().tolerance);
+  scene.tolerance = 0.5;
+  WorldOptions options;
+  EXPECT_EQ(World(scene, options).scene().tolerance, 0.5);
+  options.tolerance = 0.01;
+  EXPECT_EQ(World(scene, options).scene().tolerance, 0.01);
+  for (const double bad : {0.0, -1.0, 1.1, std::nan("")}) {
+    options.tolerance = bad;
+    try {
+      const World world(scene, options);
+      FAIL() << bad;
+    } catch (const std::invalid_argument& error) {
+      EXPECT_EQ(std::string(error.what()).find("tolerance: "), 0u) << error.what();
+    }
+  }
+}
+
 }  // namespace
 }  // namespace ball_sim::core

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "ball_sim/collision_law.hpp"
 #include "ball_sim/text.hpp"
@@ -37,34 +38,39 @@ constexpr double kWeightChange = 0.1;  // of the ball's weight
 
 constexpr double kBeside = -0.1;  // cosine to gravity: partners not above this bear a ball
 
-constexpr double kFarthestMove = 0.5;  // radii in a step; further, and one impact in 200 is missed
-
 }  // namespace
 
 Discrete::Discrete(const Surroundings& surroundings, double time_step)
     : SteppedMethod(surroundings, time_step),
       gravity_(surroundings.gravity),
       restitution_(surroundings.restitution),
+      smallest_late_(std::numeric_limits<double>::infinity()),
       watch_(std::sqrt(dot(gravity_, gravity_)), time_step) {
-  const double gained = std::sqrt(dot(gravity_, gravity_)) * time_step;  // m/s in a step
+  const double g = std::sqrt(dot(gravity_, gravity_));
+  const double gained = g * time_step;  // m/s in a step
+  rests_late_below_ = g * std::pow(time_step / kLongestRestingStep, 2);
   resting_speed_ = restitution_ < 1 ? kRestingSteps * gained : 0;
   setMargin(resting_speed_ > 0 ? gained * time_step : 0);
 }
 
 void Discrete::step() {
-  fastest_squared_ = 0;
+  forgetSpeeds();
   if (resting_speed_ > 0) {
     fallAndRest();
   } else {
     fall();
   }
-  updatePairs(std::sqrt(fastest_squared_));
+  updatePairs();
   findContacts();
   resolveImpacts();
   if (resting_speed_ > 0) {
     markResting();
     separate();
-    if (++steps_since_look_ == RestWatch::kLookEvery) fallAsleep();
+    if (++steps_since_look_ == RestWatch::kLookEvery) {
+      steps_since_look_ = 0;
+      noteLateRest();
+      fallAsleep();
+    }
   }
 }
 
@@ -87,30 +93,21 @@ void Discrete::ballsChanged() {
 // The contacts of the last step are between other balls, or seen from others.
 void Discrete::moversChanged() {
   if (resting_speed_ == 0) return;
-  updatePairs(std::sqrt(fastest_squared_));
+  updatePairs();
   findContacts();
   markResting();
 }
 
 // --- motion
 
-void Discrete::noteSpeed(const SteppedBall& ball) {
-  const double squared = dot(ball.v, ball.v);
-  fastest_squared_ = std::max(fastest_squared_, squared);
-  const double far = kFarthestMove * ball.radius / timeStep();  // m/s
-  if (squared > far * far) {
-    farthest_ = std::max(farthest_, std::sqrt(squared) * timeStep() / ball.radius);
-  }
-}
-
 void Discrete::fall() {
   const double dt = timeStep();
   for (const Slot slot : movers()) {
     SteppedBall& ball = body(slot);
-    noteSpeed(ball);
+    noteSpeed(ball.v, ball.radius);
     ball.x += dt * (ball.v + (dt / 2) * gravity_);
     ball.v += dt * gravity_;
-    noteSpeed(ball);
+    noteSpeed(ball.v, ball.radius);
   }
 }
 
@@ -120,7 +117,7 @@ void Discrete::fallAndRest() {
   const double dt = timeStep();
   for (const Slot slot : movers()) {
     SteppedBall& ball = body(slot);
-    noteSpeed(ball);
+    noteSpeed(ball.v, ball.radius);
     ball.x += (dt / 2) * ball.v;
     ball.v += dt * gravity_;
     acceleration(slot) = gravity_;
@@ -146,7 +143,7 @@ void Discrete::fallAndRest() {
   wakeWhereLoadsChanged();
   for (const Slot slot : movers()) {
     SteppedBall& ball = body(slot);
-    noteSpeed(ball);
+    noteSpeed(ball.v, ball.radius);
     ball.x += (dt / 2) * ball.v;
   }
 }
@@ -314,8 +311,15 @@ void Discrete::wakeIfUnloaded(const NearPair& pair) {
   if (standsAsleep(pair.b) && pair.reference > 0) wake(pair.b);
 }
 
+void Discrete::noteLateRest() {
+  for (const Contact& contact : contacts_) {
+    if (contact.load == 0 || isWithWall(pairs()[contact.pair])) continue;
+    const double radius = std::min(body(contact.a).radius, body(contact.b).radius);
+    if (radius < rests_late_below_) smallest_late_ = std::min(smallest_late_, radius);
+  }
+}
+
 void Discrete::fallAsleep() {
-  steps_since_look_ = 0;
   bool any = false;
   for (const Slot slot : movers()) {
     drowsy_[slot] = watch_.look(slot, body(slot)) ? 1 : 0;
@@ -366,11 +370,15 @@ Statistics Discrete::statistics() const {
 }
 
 std::string Discrete::warning() const {
-  if (farthest_ == 0) return {};
-  return "discrete: a ball moved by " + formatNumber(farthest_) +
-         " of its radius in one time_step of " + formatNumber(timeStep()) + " s: beyond " +
-         formatNumber(kFarthestMove) +
-         " balls pass through each other unseen; take a shorter time_step or method event_driven";
+  const std::string far = warningOfFarMoves();
+  if (std::isinf(smallest_late_)) return far;
+  const double g = std::sqrt(dot(gravity_, gravity_));
+  const std::string late = "discrete: balls of radius " + formatShort(smallest_late_) +
+                           " m that lie on others come to rest late at a time_step of " +
+                           formatShort(timeStep()) + " s; take one of " +
+                           formatShort(kLongestRestingStep * std::sqrt(smallest_late_ / g)) +
+                           " s or less";
+  return far.empty() ? late : far + "; " + late;
 }
 
 std::unique_ptr<Method> makeDiscrete(const Surroundings& surroundings,

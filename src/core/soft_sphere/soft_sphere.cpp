@@ -11,9 +11,7 @@
 namespace ball_sim::core {
 namespace {
 
-constexpr double kStepsPerContact = 50;        // where the scene asks for no contact time
 constexpr double kFewestStepsPerContact = 10;  // energy error 2e-3 an impact; fewer are refused
-constexpr double kUsualTolerance = 0.1;        // of a radius
 
 }  // namespace
 
@@ -26,7 +24,7 @@ SoftSphere::SoftSphere(const Surroundings& surroundings, double time_step, doubl
 
 void SoftSphere::step() {
   move();
-  updatePairs(std::sqrt(fastest_squared_));
+  updatePairs();
   pullAll();
   for (const Slot slot : movers()) {
     body(slot).v += (timeStep() / 2) * (accelerations_[slot] - acceleration(slot));
@@ -38,11 +36,11 @@ void SoftSphere::step() {
 void SoftSphere::move() {
   const double dt = timeStep();
   accelerations_.resize(slotCount());
-  fastest_squared_ = 0;
+  forgetSpeeds();
   for (const Slot slot : movers()) {
     SteppedBall& ball = body(slot);
     const Vector3 mean = ball.v + (dt / 2) * acceleration(slot);
-    fastest_squared_ = std::max(fastest_squared_, dot(mean, mean));
+    noteSpeed(mean, ball.radius);
     ball.x += dt * mean;
     ball.v += dt * acceleration(slot);
     accelerations_[slot] = surroundings().gravity;
@@ -138,25 +136,32 @@ Statistics SoftSphere::statistics() const {
 }
 
 std::string SoftSphere::warning() const {
-  if (deepest_ <= tolerance_) return {};
-  return "soft_sphere: balls overlapped by " + formatNumber(deepest_) +
-         " of a radius, more than the tolerance of " + formatNumber(tolerance_) +
-         ", in contacts of " + formatNumber(contact_time_) +
-         " s: take a shorter time_step, and a tolerance that fits it, or method event_driven";
+  const std::string far = warningOfFarMoves();
+  if (deepest_ <= tolerance_) return far;
+  const std::string deep =
+      "soft_sphere: balls overlapped by " + formatShort(deepest_) +
+      " of a radius, more than the tolerance of " + formatNumber(tolerance_) +
+      (deepest_ >= 1 ? ", and went through walls or each other" : "") + ", in contacts of " +
+      formatShort(contact_time_) +
+      " s: take a shorter time_step, and a tolerance that fits it, or method event_driven";
+  return far.empty() ? deep : deep + "; " + far;
 }
 
 std::unique_ptr<Method> makeSoftSphere(const Surroundings& surroundings,
                                        const MethodSettings& settings) {
-  const double contact_time = settings.contact_time.value_or(kStepsPerContact * settings.time_step);
+  const double contact_time =
+      settings.contact_time.value_or(kUsualStepsPerContact * settings.time_step);
   const double longest = contact_time / kFewestStepsPerContact;
   // The slack lets in a tenth that was rounded.
   if (!(settings.time_step <= longest * (1 + 1e-12))) {
-    throw std::invalid_argument("time_step: " + formatNumber(settings.time_step) +
-                                ": soft_sphere needs at most a tenth of the contact time, " +
-                                formatNumber(longest) + " s, to keep the energy of an impact");
+    throw std::invalid_argument(
+        "time_step: " + formatNumber(settings.time_step) +
+        ": soft_sphere needs at most a tenth of the contact time, " + formatNumber(longest) +
+        " s, to keep the energy of an impact; without a time_step a scene gets one that "
+        "fits");
   }
   return std::make_unique<SoftSphere>(surroundings, settings.time_step, contact_time,
-                                      settings.tolerance.value_or(kUsualTolerance));
+                                      settings.tolerance.value_or(kUsualOverlap));
 }
 
 }  // namespace ball_sim::core

@@ -11,8 +11,9 @@
 // changes the energy of an impact by about 2 (dt/t_c)^3 of it (1.7e-2, 2e-3, 2.5e-4 and 1.6e-5 at
 // t_c/5, /10, /20 and /50). While balls touch, part of the energy is in their springs
 // (Statistics::elastic_energy). A restitution below 0.01 is taken as 0.01.
-// Limits: unstable beyond dt = 2 t_c / pi = 0.637 t_c; steps above t_c/10 are refused. Overlaps
-// beyond the tolerance (without one: a tenth of a radius) make warning() speak. See also
+// Limits: unstable beyond dt = 2 t_c / pi = 0.637 t_c; steps above t_c/10 are refused; a scene that
+// names none gets one that fits (fitting_step.hpp). Overlaps beyond the tolerance (without one: a
+// tenth of a radius), and ways of more than half a radius in a step, make warning() speak. See also
 // near_pairs.hpp.
 #pragma once
 
@@ -26,6 +27,9 @@
 #include "stepping/stepped_method.hpp"
 
 namespace ball_sim::core {
+
+constexpr double kUsualStepsPerContact = 50;  ///< where the scene asks for no contact time
+constexpr double kUsualOverlap = 0.1;         ///< of a radius, where it asks for no tolerance
 
 class SoftSphere final : public SteppedMethod {
  public:
@@ -62,7 +66,6 @@ class SoftSphere final : public SteppedMethod {
   double contact_time_;                 // s
   double tolerance_;                    // of a radius
   double deepest_ = 0;                  // overlap, of the smaller radius
-  double fastest_squared_ = 0;          // m^2/s^2, in the present step
   std::vector<Vector3> accelerations_;  // m/s^2, of the end of the step, one a slot
 };
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "ball_sim/ball_check.hpp"
+#include "ball_sim/text.hpp"
 
 namespace ball_sim::core {
 namespace {
@@ -19,6 +20,10 @@ std::size_t capacityBytes(const Vector& v) {
 
 SteppedMethod::SteppedMethod(const Surroundings& surroundings, double time_step)
     : surroundings_(surroundings), clock_(time_step), near_(surroundings) {}
+
+std::string SteppedMethod::reason() const {
+  return "asked for, in steps of " + formatShort(timeStep()) + " s";
+}
 
 // --- balls
 
@@ -144,10 +149,18 @@ void SteppedMethod::sortMovers() {
   moversChanged();
 }
 
-void SteppedMethod::updatePairs(double fastest) {
-  const double distance = fastest * timeStep();
+void SteppedMethod::updatePairs() {
+  const double distance = std::sqrt(fastest_squared_) * timeStep();
   near_.noteMove(distance);
   if (!near_.isGood()) near_.list(bodies_, movers_, still_, distance, margin_);
+}
+
+std::string SteppedMethod::warningOfFarMoves() const {
+  if (farthest_ == 0) return {};
+  return std::string(name()) + ": a ball moved by " + formatShort(farthest_) +
+         " of its radius in one time_step of " + formatShort(timeStep()) + " s: beyond " +
+         formatShort(kFarthestMove) +
+         " balls pass through each other unseen; take a shorter time_step or method event_driven";
 }
 
 // --- reading

@@ -8,6 +8,8 @@
 // step. While nothing moves there is no grid; it starts with the next change.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -24,6 +26,8 @@ class SteppedMethod : public Method {
  public:
   /// @param time_step  s, finite, > 0
   SteppedMethod(const Surroundings& surroundings, double time_step);
+
+  std::string reason() const override;
 
   void insert(BallId id, const Ball& ball) override;
   void remove(BallId id) override;
@@ -80,9 +84,25 @@ class SteppedMethod : public Method {
   }
   static bool isWithWall(const NearPair& pair) { return pair.b >= kFirstWall; }
 
-  /// Lists the near pairs anew where balls have moved too far.
-  /// @param fastest  m/s, speed of the fastest ball
-  void updatePairs(double fastest);
+  /// A step begins: no speed was noted in it yet.
+  void forgetSpeeds() { fastest_squared_ = 0; }
+
+  /// Notes a speed that a ball moves at in this step, m/s.
+  /// @param radius  of the ball, m
+  void noteSpeed(const Vector3& velocity, double radius) {
+    const double squared = dot(velocity, velocity);
+    fastest_squared_ = std::max(fastest_squared_, squared);
+    const double far = kFarthestMove * radius / timeStep();  // m/s
+    if (squared > far * far) {
+      farthest_ = std::max(farthest_, std::sqrt(squared) * timeStep() / radius);
+    }
+  }
+
+  /// That a ball moved so far in a step that it may have passed others unseen; empty: none did.
+  std::string warningOfFarMoves() const;
+
+  /// Lists the near pairs anew where balls have moved too far, by the speeds noted in this step.
+  void updatePairs();
 
   /// Pairs are listed already when they are so near, m.
   void setMargin(double margin) { margin_ = margin; }
@@ -95,6 +115,8 @@ class SteppedMethod : public Method {
   void report(const NearPair& pair, const Vector3& normal, double impulse, double approach_speed);
 
  private:
+  static constexpr double kFarthestMove = 0.5;  // radii in a step; beyond it discrete misses one
+                                                // impact in 200
   enum class Change : std::uint8_t { none, is_pushed, is_new };
 
   std::vector<Slot>::const_iterator find(BallId id) const;
@@ -110,7 +132,9 @@ class SteppedMethod : public Method {
   Surroundings surroundings_;
   StepClock clock_;
   Time now_;
-  double margin_ = 0;  // m
+  double margin_ = 0;           // m
+  double fastest_squared_ = 0;  // m^2/s^2, in the present step
+  double farthest_ = 0;         // of its radius, that a ball moved in one step; 0: not too far
 
   // One entry a slot; a slot is reused when its ball is removed.
   std::vector<SteppedBall> bodies_;
