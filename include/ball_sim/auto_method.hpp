@@ -12,8 +12,10 @@
 // - Another exact method would cost much less at the rate of collisions that is counted.
 // A flood that comes back soon after a pile was stirred doubles the time before the next way back,
 // so that no scene makes it flutter. An exact method is left for a stepping one only in a flood,
-// and never where impacts at one instant are to be taken together, which only event_driven can. An
-// exact method whose balls overlap by more than the tolerance makes warning() speak.
+// and never where impacts at one instant are to be taken together, which only event_driven can.
+// An exact method whose balls overlap by more than the tolerance makes warning() speak, and so does
+// one whose energy drifts by more than that where impacts keep it (restitution 1). Neither leads to
+// a change: the other exact methods round as this one does.
 //
 // Gets right: what the method at work does. Misses: a change over forgets which balls have just
 // met; energy that contacts of discrete held at rest in overlap comes free within its tolerance.
@@ -68,7 +70,10 @@ class AutoMethod final : public Method {
     double mean_speed = 0;      // m/s
     double median_speed = 0;    // m/s
     double fastest = 0;         // m/s
-    double energy = 0;          // J, kinetic and of gravity
+    double kinetic = 0;         // J
+    double potential = 0;       // J, of gravity
+
+    double energy() const { return kinetic + potential; }
   };
 
   std::uint64_t eventsToLook(std::uint64_t counted) const;
@@ -76,9 +81,12 @@ class AutoMethod final : public Method {
   void startWindow();
   Look look();
   void survey();
+  void watchEnergy(const Look& look);
   void judge(const Look& look);
   void judgeExact(const Look& look);
   void judgeStepping(const Look& look);
+  std::string overlapWarning() const;
+  std::string energyWarning() const;
   double energyLimit(const Look& look) const;
   bool floods(const Look& look) const;
   std::string stirring(const Look& look) const;
@@ -93,6 +101,7 @@ class AutoMethod final : public Method {
   MethodSettings settings_;
   double gravity_ = 0;                // m/s^2, magnitude
   std::vector<std::string> choices_;  // methods there are for this scene
+  bool keeps_energy_ = false;
   bool can_pile_ = false;
   std::string exact_name_;    // the exact method to go back to
   std::string exact_reason_;  // of the choice at the start
@@ -121,6 +130,9 @@ class AutoMethod final : public Method {
   Time changed_at_;
   double stay_ = 0;             // s, of stepping before the way back is open
   double energy_limit_ = 0;     // J, of a pile left alone
+  double energy_kept_ = 0;      // J, when numbers_ were taken
+  double most_kinetic_ = 0;     // J, since then
+  double energy_drift_ = 0;     // of most_kinetic_, the largest so far
   BallStates states_;           // scratch
   std::vector<double> speeds_;  // scratch
 };

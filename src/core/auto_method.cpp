@@ -48,6 +48,7 @@ AutoMethod::AutoMethod(const Surroundings& surroundings, const MethodSettings& s
       settings_(settings),
       gravity_(std::sqrt(dot(surroundings.gravity, surroundings.gravity))),
       choices_(methodsThatKeep(settings.simultaneous_impacts)),
+      keeps_energy_(surroundings.restitution == 1),
       can_pile_(gravity_ > 0 && surroundings.restitution < 1 && isAmong(choices_, "discrete")),
       exact_name_(first.name),
       exact_reason_(first.reason),
@@ -64,17 +65,31 @@ std::string AutoMethod::reason() const {
   return text;
 }
 
-// An exact method overlaps balls by rounding, or by what a stepping one left it.
 std::string AutoMethod::warning() const {
-  std::string own = method_->warning();
+  std::string text;
+  for (const std::string& one : {method_->warning(), overlapWarning(), energyWarning()}) {
+    if (!one.empty()) text += (text.empty() ? "" : "; ") + one;
+  }
+  return text;
+}
+
+// An exact method overlaps balls by rounding, or by what a stepping one left it.
+std::string AutoMethod::overlapWarning() const {
   const double overlap = method_->statistics().deepest_overlap;
   const double limit = settings_.tolerance.value_or(kVisibleError) * numbers_.smallest_radius;
-  if (stepping_ || !(overlap > std::max(limit, before_.deepest_overlap))) return own;
-  const std::string deep = "balls overlapped by " + formatShort(overlap) + " m at an impact, and " +
-                           formatShort(limit) +
-                           " m is the tolerance: places are wrong by as much; see that none is put "
-                           "into another";
-  return own.empty() ? deep : own + "; " + deep;
+  if (stepping_ || !(overlap > std::max(limit, before_.deepest_overlap))) return {};
+  return "balls overlapped by " + formatShort(overlap) + " m at an impact, and " +
+         formatShort(limit) +
+         " m is the tolerance: places are wrong by as much; see that none is put into another";
+}
+
+std::string AutoMethod::energyWarning() const {
+  const double limit = settings_.tolerance.value_or(kVisibleError);
+  if (!(energy_drift_ > limit)) return {};
+  return "energy has drifted by " + formatShort(energy_drift_) +
+         " of that of motion where impacts keep it, and " + formatShort(limit) +
+         " is the tolerance: speeds are wrong by half of that; precision long_double tells "
+         "whether it is rounding";
 }
 
 void AutoMethod::insert(BallId id, const Ball& ball) {
@@ -162,14 +177,15 @@ AutoMethod::Look AutoMethod::look() {
     look.mean_speed += speeds_.back() / static_cast<double>(movable_);
     look.fastest = std::max(look.fastest, speeds_.back());
   }
-  look.energy =
-      kineticEnergy(states_, masses) + potentialEnergy(states_, masses, surroundings_.gravity);
+  look.kinetic = kineticEnergy(states_, masses);
+  look.potential = potentialEnergy(states_, masses, surroundings_.gravity);
   if (!speeds_.empty()) {
     const auto middle = speeds_.begin() + static_cast<std::ptrdiff_t>(speeds_.size() / 2);
     std::nth_element(speeds_.begin(), middle, speeds_.end());
     look.median_speed = *middle;
   }
   if (changed_outside_) survey();
+  watchEnergy(look);
   return look;
 }
 
@@ -177,12 +193,23 @@ AutoMethod::Look AutoMethod::look() {
 void AutoMethod::survey() {
   method_->read(states_);
   std::vector<Ball> balls;
+  std::vector<double> masses;
   for (std::size_t i = 0; i < balls_.size(); ++i) {
     balls.push_back(
         {states_.positions[i], states_.velocities[i], balls_[i].radius, balls_[i].mass});
+    masses.push_back(balls_[i].mass);
   }
   numbers_ = sceneNumbers(surroundings_, balls);
+  most_kinetic_ = kineticEnergy(states_, masses);
+  energy_kept_ = most_kinetic_ + potentialEnergy(states_, masses, surroundings_.gravity);
   changed_outside_ = false;
+}
+
+void AutoMethod::watchEnergy(const Look& look) {
+  if (!keeps_energy_) return;
+  most_kinetic_ = std::max(most_kinetic_, look.kinetic);
+  const double drift = std::abs(look.energy() - energy_kept_);
+  if (drift > 0) energy_drift_ = std::max(energy_drift_, drift / most_kinetic_);
 }
 
 void AutoMethod::judge(const Look& look) {
@@ -216,7 +243,7 @@ void AutoMethod::judgeExact(const Look& look) {
 double AutoMethod::energyLimit(const Look& look) const {
   double weight = 0;  // N
   for (const Properties& ball : balls_) weight += std::isinf(ball.mass) ? 0 : gravity_ * ball.mass;
-  return look.energy + weight * numbers_.mean_radius;
+  return look.energy() + weight * numbers_.mean_radius;
 }
 
 // Whether nearly all events are those of balls that are held up by others.
@@ -244,7 +271,7 @@ std::string AutoMethod::stirring(const Look& look) const {
     return "stirred: half of the balls move at " + formatShort(look.median_speed) +
            " m/s or faster";
   }
-  if (look.energy > energy_limit_) return "energy has appeared";
+  if (look.energy() > energy_limit_) return "energy has appeared";
   return "";
 }
 

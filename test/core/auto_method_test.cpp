@@ -253,6 +253,39 @@ TEST(AutoMethod, warnsOfOverlapBeyondTheTolerance) {
   EXPECT_EQ(run.method().warning().find("balls overlapped by 0.1 m"), 0u) << run.method().warning();
 }
 
+// Its rounding stands in for a method that is wrong: no double keeps energy to 1e-17 of it.
+TEST(AutoMethod, warnsOfEnergyThatDriftsBeyondTheTolerance) {
+  Scene scene = gas(300);
+  AutoRun usual(scene);
+  usual.advanceTo(3);
+  EXPECT_EQ(usual.method().warning(), "");
+  for (BallId id = 0; id < 300; ++id) {
+    usual.method().setVelocity(id, 2 * usual.method().ball(id).velocity);
+  }
+  usual.advanceTo(4);
+  EXPECT_EQ(usual.method().warning(), "") << "that energy came from outside";
+  scene.tolerance = 1e-17;
+  AutoRun fine(scene);
+  fine.advanceTo(3);
+  EXPECT_NE(fine.method().warning().find("energy has drifted by"), std::string::npos)
+      << fine.method().warning();
+  EXPECT_EQ(fine.method().changes(), 0u);
+  scene.surroundings.restitution = 0.9;
+  AutoRun inelastic(scene);
+  inelastic.advanceTo(3);
+  EXPECT_EQ(inelastic.method().warning().find("energy"), std::string::npos) << "impacts take it";
+}
+
+// Bounces from rest: at first there is no kinetic energy to measure a drift by.
+TEST(AutoMethod, energyMayFallAndRiseUnderGravity) {
+  Scene scene = stack(40, 0.02);
+  scene.surroundings.restitution = 1;
+  AutoRun run(scene);
+  run.advanceTo(5);
+  EXPECT_GT(run.method().statistics().events, 10000u) << "looked at twice";
+  EXPECT_EQ(run.method().warning(), "");
+}
+
 TEST(AutoMethod, takesChangesFromOutside) {
   AutoRun run(gas(50));
   run.advanceTo(0.5);
