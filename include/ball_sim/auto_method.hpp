@@ -7,11 +7,13 @@
 //   hundreds of impacts while a ball would fall by its radius, none of which moves anything. From
 //   then on method discrete steps, with contacts that rest. Its step is the scene's, or shorter, so
 //   that what a ball falls in a step stays within the scene's tolerance.
+// - A pile from the start, as a scene may have it: every ball lies still, upon a wall or another
+//   ball. There is no need to wait for its flood.
 // - The pile is stirred: half of the balls move fast enough to rise by their radius, or one of them
 //   moves half its radius a step, or energy has appeared. Back to the exact method.
 // - Another exact method would cost much less at the rate of collisions that is counted.
 // A flood that comes back soon after a pile was stirred doubles the time before the next way back,
-// so that no scene makes it flutter. An exact method is left for a stepping one only in a flood,
+// so that no scene makes it flutter. An exact method is left for a stepping one only for a pile,
 // and never where impacts at one instant are to be taken together, which only event_driven can.
 // An exact method whose balls overlap by more than the tolerance makes warning() speak, and so does
 // one whose energy drifts by more than that where impacts keep it (restitution 1). Neither leads to
@@ -90,6 +92,8 @@ class AutoMethod final : public Method {
   double energyLimit(const Look& look) const;
   bool floods(const Look& look) const;
   std::string stirring(const Look& look) const;
+  void startStepping(const std::string& reason);
+  bool liesStill() const;
   void considerCheaper(const Look& look);
   void changeTo(const std::string& name, const std::string& reason);
   std::unique_ptr<Method> make(const std::string& name) const;

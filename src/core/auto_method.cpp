@@ -4,8 +4,11 @@
 #include <cmath>
 #include <limits>
 
+#include "ball_sim/ball_check.hpp"
 #include "ball_sim/observables.hpp"
+#include "ball_sim/overlap_index.hpp"
 #include "ball_sim/text.hpp"
+#include "ball_sim/walls.hpp"
 
 namespace ball_sim::core {
 namespace {
@@ -24,6 +27,7 @@ constexpr int kFloodWindows = 2;
 constexpr double kMuchCheaper = 1.5;
 constexpr int kDearWindows = 4;
 
+constexpr double kTouching = 1e-6;   // of a radius: nearer is as good as in touch
 constexpr double kFirstStay = 10;    // falls by a radius, of stepping before the way back is open
 constexpr double kFarPerStep = 0.5;  // of the smallest radius: further, and impacts are missed
 
@@ -142,7 +146,11 @@ std::uint64_t AutoMethod::eventsToLook(std::uint64_t counted) const {
 }
 
 bool AutoMethod::advanceTo(Time target, std::uint64_t max_events) {
-  if (numbers_.balls == 0 && movable_ > 0) survey();
+  if (numbers_.balls == 0 && movable_ > 0) {
+    survey();
+    if (can_pile_ && liesStill())
+      startStepping("all balls lie still, upon one another or on walls");
+  }
   std::uint64_t counted = method_->statistics().events;
   while (true) {
     const std::uint64_t before = counted;
@@ -227,15 +235,49 @@ void AutoMethod::judgeExact(const Look& look) {
     considerCheaper(look);
     return;
   }
+  startStepping(formatShort(look.event_rate) +
+                " events per ball and second where balls lie on balls");
+  energy_limit_ = energyLimit(look);
+}
+
+void AutoMethod::startStepping(const std::string& reason) {
   // A flood soon after the pile was stirred: next time the way back opens later.
   const bool soon = changes_ > 0 && now() - changed_at_ < 10 * stay_;
   stay_ = soon ? 2 * stay_ : kFirstStay * fallTime();
-  const double step = steppingStep();
-  changeTo("discrete", formatShort(look.event_rate) +
-                           " events per ball and second where balls lie on balls; steps of " +
-                           formatShort(step) + " s until they are stirred" +
+  changeTo("discrete", reason + "; steps of " + formatShort(steppingStep()) +
+                           " s until they are stirred" +
                            (settings_.tolerance ? "" : ", exact no longer"));
-  energy_limit_ = energyLimit(look);
+}
+
+// Whether nothing moves, and every ball that can has something below it that it touches.
+bool AutoMethod::liesStill() const {
+  const auto moves = [](const Vector3& v) { return dot(v, v) > 0; };
+  if (std::any_of(states_.velocities.begin(), states_.velocities.end(), moves)) return false;
+  OverlapIndex index(surroundings_);
+  for (std::size_t i = 0; i < balls_.size(); ++i) {
+    index.insert(i, states_.positions[i], balls_[i].radius);
+  }
+  const std::vector<Wall<double>> walls = wallsOf<double>(surroundings_);
+  std::vector<std::size_t> touched;
+  for (std::size_t i = 0; i < balls_.size(); ++i) {
+    if (std::isinf(balls_[i].mass)) continue;
+    const Vector3& x = states_.positions[i];
+    const double reach = balls_[i].radius * (1 + kTouching);
+    const auto holds = [&](const Wall<double>& wall) {
+      return dot(wall.normal, surroundings_.gravity) < 0 &&
+             dot(x, wall.normal) - wall.offset < reach;
+    };
+    const auto is_below = [&](std::size_t other) {
+      const Vector3 way = separation(x, states_.positions[other], surroundings_);
+      return dot(way, surroundings_.gravity) > 0;
+    };
+    index.findAll(x, reach, touched);
+    if (std::none_of(walls.begin(), walls.end(), holds) &&
+        std::none_of(touched.begin(), touched.end(), is_below)) {
+      return false;
+    }
+  }
+  return true;
 }
 
 // Left alone, a pile has no more energy than now, but for what resting contacts hold in overlap and

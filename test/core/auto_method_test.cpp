@@ -169,6 +169,43 @@ TEST(AutoMethod, aStackComesToRestBySteps) {
   }
 }
 
+TEST(AutoMethod, aPileFromTheStartNeedsNoFlood) {
+  if (!canStep()) GTEST_SKIP() << "there is no stepping method";
+  AutoRun run(stack(10, 0));
+  run.advanceTo(0.001);
+  EXPECT_EQ(run.name(), "discrete");
+  EXPECT_NE(run.method().reason().find("all balls lie still"), std::string::npos)
+      << run.method().reason();
+  run.advanceTo(10);
+  EXPECT_EQ(run.method().changes(), 1u);
+}
+
+// At rest, but not for long, or not quite at rest.
+TEST(AutoMethod, whatFallsIsNoPile) {
+  if (!canStep()) GTEST_SKIP() << "there is no stepping method";
+  const auto is_pile = [](const Scene& scene) {
+    AutoRun run(scene);
+    run.advanceTo(1e-6);
+    return run.method().reason().find("all balls lie still") != std::string::npos;
+  };
+  EXPECT_TRUE(is_pile(stack(3, 0)));
+  Scene one_in_the_air = stack(3, 0);
+  one_in_the_air.balls[2].position.z() += 1e-3;
+  EXPECT_FALSE(is_pile(one_in_the_air));
+  Scene pushed = stack(3, 0);
+  pushed.balls[2].velocity.x() = 1e-3;
+  EXPECT_FALSE(is_pile(pushed));
+  Scene side_by_side = stack(2, 0);
+  side_by_side.surroundings.box.max = Vector3(1, 1, 1);
+  side_by_side.balls[0].position = Vector3(0.5, 0.5, 0.5);
+  side_by_side.balls[1].position = Vector3(0.6, 0.5, 0.5);
+  EXPECT_FALSE(is_pile(side_by_side));
+  side_by_side.balls[0].position.z() = side_by_side.balls[1].position.z() = 0.95;  // at the ceiling
+  EXPECT_FALSE(is_pile(side_by_side));
+  side_by_side.balls[0].position.z() = side_by_side.balls[1].position.z() = 0.05;
+  EXPECT_TRUE(is_pile(side_by_side));
+}
+
 TEST(AutoMethod, aStirredPileGoesBackToImpacts) {
   if (!canStep()) GTEST_SKIP() << "there is no stepping method";
   AutoRun run(stack(10, 0.01));
