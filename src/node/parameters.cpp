@@ -35,6 +35,12 @@ class Reader {
     return numberWithin(name, lower, upper, true);
   }
 
+  /// The same, and 0 stands for a parameter that is not set: launch files cannot leave one out.
+  std::optional<double> numberOrAbsent(const std::string& name, double lower, double upper) {
+    const std::optional<double> number = numberOrZero(name, lower, upper);
+    return number == 0.0 ? std::nullopt : number;
+  }
+
   std::optional<int> integer(const std::string& name, int lower, int upper) {
     auto value = find(name);
     if (!value) {
@@ -133,7 +139,9 @@ Parameters readParameters(const ros::NodeHandle& private_node) {
   Parameters p;
   p.scene = reader.text("scene").value_or(p.scene);
   p.method = reader.text("method").value_or(p.method);
-  p.time_step = reader.number("time_step", 1e-9, 1);
+  p.time_step = reader.numberOrAbsent("time_step", 1e-9, 1);
+  p.tolerance = reader.numberOrAbsent("tolerance", 1e-15, 1);
+  p.threads = reader.integer("threads", 1, 1024).value_or(p.threads);
   const int seed = reader.integer("seed", -1, std::numeric_limits<int>::max()).value_or(-1);
   if (seed >= 0) {
     p.seed = seed;

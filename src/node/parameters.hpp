@@ -22,7 +22,11 @@ class ParameterError : public std::runtime_error {
 struct Parameters {
   std::string scene = "break_shot";  ///< path of a file, or name of a shipped scene
   std::string method;                ///< a method's name; empty: the scene's
-  std::optional<double> time_step;   ///< s, 1e-9..1, for stepping methods; absent: the scene's
+  std::optional<double> time_step;   ///< s, 1e-9..1, for stepping methods; absent (or 0): the
+                                     ///< scene's
+  std::optional<double> tolerance;   ///< error one may make, of a radius, 1e-15..1; absent (or 0):
+                                     ///< the scene's
+  int threads = 1;                   ///< 1..1024, of method continuous; changes no bit
   std::optional<std::int64_t> seed;  ///< >= 0: fill k gets seed + k; absent (or -1): the scene's
   std::string frame_id = "world";    ///< frame of all positions; not empty
   double real_time_factor = 1;       ///< simulated per wall second, 0.001..1000;

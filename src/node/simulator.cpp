@@ -291,6 +291,7 @@ SimStats Simulator::stats(Clock::time_point wall) {
   stats.momentum = toVector(world_.momentum());
   stats.energy_drift = stats.kinetic_energy + stats.potential_energy - reference_energy_;
   stats.deepest_overlap = counts.deepest_overlap;
+  stats.ambiguous_impacts = counts.ambiguous_impacts;
   stats.late_frames = late_frames_;
   stats.dropped_collisions = dropped_collisions_;
   stats_wall_ = wall;

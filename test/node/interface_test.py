@@ -175,7 +175,17 @@ class InterfaceTest(unittest.TestCase):
         self.assertAlmostEqual(message.kinetic_energy, 1, delta=ROUNDING)  # 2 kg, 1 m/s
         self.assertAlmostEqual(message.momentum.x, -2, delta=ROUNDING)  # back from the wall
         self.assertAlmostEqual(message.energy_drift, 0, delta=ROUNDING)
+        self.assertEqual(message.ambiguous_impacts, 0)
         self.assertEqual(message.dropped_collisions, 0)
+
+    def test_stats_count_impacts_that_a_policy_decided(self):
+        stats = self.listen('stats', SimStats)
+        for x, speed, mass in ((-0.1, 1, 1), (0, 0, 2), (0.1, -1, 1)):  # they touch, and close in
+            answer = self.spawn(x, -0.4, velocity=Vector3(speed, 0, 0), radius=0.05, mass=mass)
+            self.assertTrue(answer.success, answer.message)
+        reached = self.step(seconds=0.1)
+        message = stats.wait(lambda m: m.header.stamp == reached)
+        self.assertGreater(message.ambiguous_impacts, 0)
 
     def test_energy_drift_begins_anew_after_a_kick(self):
         stats = self.listen('stats', SimStats)

@@ -54,8 +54,9 @@ class LaunchFilesTest(unittest.TestCase):
 
     def test_simulation_arguments(self):
         arguments = roslaunch.arg_dump.get_args([os.path.join(FOLDER, 'simulation.launch')])
-        for name in ('scene', 'method', 'rviz', 'paused', 'real_time_factor', 'seed', 'record',
-                     'bag_prefix', 'use_sim_time'):
+        for name in ('scene', 'method', 'time_step', 'tolerance', 'threads', 'rviz', 'paused',
+                     'real_time_factor', 'seed', 'color_by', 'record', 'bag_prefix',
+                     'use_sim_time'):
             self.assertIn(name, arguments)
 
     def test_arguments_say_what_starts(self):
@@ -64,6 +65,11 @@ class LaunchFilesTest(unittest.TestCase):
         self.assertIn('/ball_sim/wait_for_viewer', load('simulation.launch')[1].params)
         self.assertNotIn('/ball_sim/wait_for_viewer',
                          load('simulation.launch', 'rviz:=false')[1].params)
+        _, config = load('simulation.launch', 'method:=continuous', 'time_step:=0.002',
+                         'tolerance:=1e-4', 'threads:=2')
+        for name, value in (('method', 'continuous'), ('time_step', 0.002), ('tolerance', 1e-4),
+                            ('threads', 2)):
+            self.assertEqual(config.params['/ball_sim/' + name].value, value)
         self.assertNotIn('ball_sim_record', load('simulation.launch')[0])
         recorder = load('simulation.launch', 'record:=true', 'bag_prefix:=here')[0]['ball_sim_record']
         for word in ('--split', '--lz4', 'here', 'ball_states', 'ball_properties', 'collisions',

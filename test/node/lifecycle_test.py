@@ -40,7 +40,9 @@ class LifecycleTest(unittest.TestCase):
                  ('real_time_factor', '-1', '0 or 0.001 to 1000'),
                  ('wait_for_viewer', '601', '0 or 0.1 to 600'),
                  ('start_time', '0', '1e-09 to 4000000000'),
-                 ('time_step', '0', '1e-09 to 1'), ('seed', '-2', '-1 to 2147483647'),
+                 ('time_step', '2', '0 or 1e-09 to 1'), ('time_step', '-1', '0 or 1e-09'),
+                 ('tolerance', '2', '0 or 1e-15 to 1'), ('threads', '0', '1 to 1024'),
+                 ('threads', '1.5', 'whole number'), ('seed', '-2', '-1 to 2147483647'),
                  ('seed', '1.5', 'whole number'), ('max_balls', '0', '1 to 10000000'),
                  ('max_events_per_frame', '0', '1 to 1000000000'),
                  ('wall_timeout', '0', '0.1 to 60'), ('color_by', 'taste', 'id, speed, radius, mass'),
@@ -54,6 +56,22 @@ class LifecycleTest(unittest.TestCase):
             self.assertIn('FATAL', node.output())
             for word in (name, value.strip('.'), rule):
                 self.assertIn(word, node.output())
+
+    def test_parameters_go_before_the_scene(self):
+        for i, (method, reason, parameters) in enumerate((
+                ('discrete', 'in steps of 0.002 s', {'method': 'discrete', 'time_step': 0.002}),
+                ('discrete', 'in steps of 0.001 s', {'method': 'discrete', 'time_step': 0}),
+                ('event_driven', 's at 0.0001', {'tolerance': 1e-4}),
+                ('event_driven', 's at 0.01', {'tolerance': 0}),
+                ('continuous', 'asked for', {'method': 'continuous', 'threads': 2}))):
+            name = 'asked_%d' % i
+            node = self.start(name, scene=scene('gas'), **parameters)
+            stats = Listener(name + '/stats', SimStats)
+            message = stats.wait(lambda m: m.balls == 300)
+            self.assertEqual(message.method, method)
+            self.assertIn(reason, message.method_reason)
+            stats.close()
+            node.stop()
 
     def test_roslaunch_shows_why_the_node_ended(self):
         process = Process(['roslaunch', 'ball_sim', 'simulation.launch', 'rviz:=false',

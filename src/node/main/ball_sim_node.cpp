@@ -28,6 +28,8 @@ core::World makeWorld(const Parameters& parameters) {
   core::WorldOptions options;
   options.method = parameters.method;
   options.time_step = parameters.time_step;
+  options.tolerance = parameters.tolerance;
+  options.threads = static_cast<unsigned>(parameters.threads);
   options.max_balls = static_cast<std::size_t>(parameters.max_balls);
   return core::World(scene, options);
 }
