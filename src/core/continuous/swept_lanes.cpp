@@ -20,7 +20,7 @@ namespace {
 constexpr float kSlack = 1e-6F;
 
 // As many lanes as most runs are long; narrower instructions take them in parts.
-constexpr std::size_t kLanes = SweptLanes::kWidth;
+constexpr std::uint32_t kLanes = SweptLanes::kWidth;
 typedef float Floats __attribute__((vector_size(4 * kLanes)));        // NOLINT(modernize-use-using)
 typedef std::int32_t Flags __attribute__((vector_size(4 * kLanes)));  // NOLINT(modernize-use-using)
 
