@@ -12,12 +12,6 @@ namespace ball_sim::core {
 namespace test {
 namespace {
 
-MethodSettings stepsOf(double time_step) {
-  MethodSettings settings;
-  settings.time_step = time_step;
-  return settings;
-}
-
 Trial discrete(const TestScene& scene, double time_step) {
   return Trial("discrete", scene, stepsOf(time_step));
 }

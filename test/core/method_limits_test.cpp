@@ -18,12 +18,6 @@ namespace ball_sim::core {
 namespace test {
 namespace {
 
-MethodSettings stepsOf(double time_step) {
-  MethodSettings settings;
-  settings.time_step = time_step;
-  return settings;
-}
-
 // --- tunnelling
 
 constexpr int kShots = 20000;

@@ -23,6 +23,13 @@ struct TestScene {
   std::vector<Ball> balls;
 };
 
+/// Steps of `time_step` seconds, for a method that has steps.
+inline MethodSettings stepsOf(double time_step) {
+  MethodSettings settings;
+  settings.time_step = time_step;
+  return settings;
+}
+
 /// A method that holds a scene's balls and logs every impact from time 0 on.
 class Trial {
  public:
