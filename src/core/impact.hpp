@@ -31,20 +31,18 @@ struct BallImpact {
 /// @param now    s, on the clock of the histories
 template <class Real>
 BallImpact<Real> meetBall(const VectorOf<Real>& dx, Real reach, const VectorOf<Real>& pressing,
-                          Real restitution, Real now, Impacting<Real> a, Impacting<Real> b) {
-  BallImpact<Real> impact;
-  impact.normal = contactNormal<Real>(dx);
-  impact.overlap = reach - dot(dx, impact.normal);
-  const Real least = leastRebound<Real>(dot(pressing, impact.normal), reach);
+                          Real restitution, Real now, const Impacting<Real>& a,
+                          const Impacting<Real>& b) {
+  const VectorOf<Real> normal = contactNormal<Real>(dx);
+  const Real least = leastRebound<Real>(dot(pressing, normal), reach);
   if (restitution < 1) {
-    const Real speed = dot(a.v, impact.normal) - dot(b.v, impact.normal);
+    const Real speed = dot(a.v, normal) - dot(b.v, normal);
     const bool a_collapses = a.history.record(now, speed, reach);
     const bool b_collapses = b.history.record(now, speed, reach);
     if (a_collapses || b_collapses) restitution = 1;
   }
-  impact.exchange =
-      collide<Real>(a.v, a.inverse_mass, b.v, b.inverse_mass, impact.normal, restitution, least);
-  return impact;
+  return {normal, reach - dot(dx, normal),
+          collide<Real>(a.v, a.inverse_mass, b.v, b.inverse_mass, normal, restitution, least)};
 }
 
 /// What passed between a ball and a wall.
@@ -62,7 +60,7 @@ struct WallImpact {
 /// @param now   s, on the clock of the history
 template <class Real>
 WallImpact<Real> meetWall(const Wall<Real>& wall, const VectorOf<Real>& x, Real radius, Real pull,
-                          Real restitution, Real now, Impacting<Real> ball) {
+                          Real restitution, Real now, const Impacting<Real>& ball) {
   WallImpact<Real> impact;
   impact.speed = -dot(ball.v, wall.normal);
   impact.overlap = wall.offset + radius - dot(x, wall.normal);
