@@ -15,6 +15,7 @@
 #include <cassert>
 #include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "ball_sim/ball.hpp"
@@ -75,7 +76,6 @@ class EventQueue {
     year_ = bucket_width * Real(buckets);
     heads_.assign(buckets + kFarAhead + 1, kNoSlot);  // one can look ahead without asking
     for (Agenda<Real>& agenda : agendas_) agenda.previous = kNotQueued;
-    beyond_ = kNoSlot;
     current_ = 0;
     at_hand_.clear();
     in_year_ = 0;
@@ -88,13 +88,8 @@ class EventQueue {
   /// Adds a ball that is not queued. Its due() must not change while it is, and not be before the
   /// last event taken out.
   void insert(Slot slot) {
-    const Real due = agendas_[slot].due();
-    if (isBeyondYear(due)) {
-      link(slot, beyond_);
-      return;
-    }
-    ++in_year_;
-    const std::uint32_t bucket = bucketOf(due);
+    const std::uint32_t bucket = bucketOf(agendas_[slot].due());
+    in_year_ += isInYear(bucket) ? 1 : 0;
     if (bucket <= current_) {
       takeAtHand(slot);
     } else {
@@ -110,10 +105,9 @@ class EventQueue {
       --in_year_;
       at_hand_.erase(agenda.next);
     } else {
-      const Real due = agenda.due();
-      const bool beyond = isBeyondYear(due);
-      if (!beyond) --in_year_;
-      unlink(agenda, beyond ? beyond_ : heads_[bucketOf(due)]);
+      const std::uint32_t bucket = bucketOf(agenda.due());
+      in_year_ -= isInYear(bucket) ? 1 : 0;
+      unlink(agenda, heads_[bucket]);
     }
     agenda.previous = kNotQueued;
   }
@@ -125,7 +119,7 @@ class EventQueue {
   bool isDue(Real limit, Expect expect) {
     while (at_hand_.empty()) {
       if (in_year_ == 0) return false;
-      const std::uint32_t last = isBeyondYear(limit) ? buckets_ - 1 : bucketOf(limit);
+      const std::uint32_t last = std::min(bucketOf(limit), buckets_ - 1);
       do {
         if (current_ >= last) return false;
         ++current_;
@@ -154,8 +148,7 @@ class EventQueue {
   void turnYear() {
     assert(in_year_ == 0);
     current_ = 0;
-    Slot slot = beyond_;
-    beyond_ = kNoSlot;
+    Slot slot = std::exchange(heads_[buckets_], kNoSlot);
     while (slot != kNoSlot) {
       const Slot next = agendas_[slot].next;
       agendas_[slot].previous = kNotQueued;
@@ -167,7 +160,7 @@ class EventQueue {
   /// The earliest time of all events beyond the year; infinity when there are none.
   Real earliestBeyond() const {
     Real earliest = std::numeric_limits<Real>::infinity();
-    for (Slot slot = beyond_; slot != kNoSlot; slot = agendas_[slot].next) {
+    for (Slot slot = heads_[buckets_]; slot != kNoSlot; slot = agendas_[slot].next) {
       earliest = std::min(earliest, agendas_[slot].due());
     }
     return earliest;
@@ -178,15 +171,19 @@ class EventQueue {
   // Up to so many balls all is in the cache anyway, and to fetch ahead would only cost.
   static constexpr std::size_t kCachedBalls = 20000;
 
-  bool isBeyondYear(Real due) const { return !(due < yearLength()); }
+  // All that is beyond the year shares the bucket behind it.
   std::uint32_t bucketOf(Real due) const {
-    const auto bucket = due > 0 ? static_cast<std::uint32_t>(due * per_width_) : 0;
-    return std::min(bucket, buckets_ - 1);  // 1/width is rounded
+    const Real last = Real(buckets_ - 1);  // 1/width is rounded
+    const Real bucket = std::max(Real(0), std::min(due * per_width_, last));
+    // Without a branch, which would often be foretold wrongly.
+    return static_cast<std::uint32_t>(bucket) + (due < year_ ? 0 : 1);
   }
+  bool isInYear(std::uint32_t bucket) const { return bucket < buckets_; }
 
   // --- the bucket at hand
 
-  void takeAtHand(Slot slot) {
+  // Not inlined: insert(), which seldom comes here, would save registers for it every time.
+  [[gnu::noinline]] void takeAtHand(Slot slot) {
     Agenda<Real>& agenda = agendas_[slot];
     agenda.previous = kAtHand;
     agenda.next = at_hand_.insert(slot, agenda.due());
@@ -206,6 +203,7 @@ class EventQueue {
     const Slot far = heads_[current_ + kFarAhead];
     if (far != kNoSlot) __builtin_prefetch(&agendas_[far]);
     for (const std::uint32_t ahead : {kSoon, kNext}) {
+      if (current_ + ahead == buckets_) continue;  // beyond the year there is no telling when
       for (Slot s = heads_[current_ + ahead]; s != kNoSlot; s = agendas_[s].next) expect(s, ahead);
     }
   }
@@ -227,8 +225,7 @@ class EventQueue {
   Real width_ = 1;
   Real per_width_ = 1;
   Real year_ = 0;
-  HugePageVector<Slot> heads_;  // of the buckets' lists
-  Slot beyond_ = kNoSlot;       // head of the list of events beyond the year
+  HugePageVector<Slot> heads_;  // of the buckets' lists; behind them, of that beyond the year
   std::uint32_t buckets_ = 0;
   std::uint32_t current_ = 0;
   std::size_t in_year_ = 0;  // events queued that are not beyond the year
