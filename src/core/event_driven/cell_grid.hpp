@@ -94,9 +94,11 @@ class CellLevel {
     std::uint32_t stride = 1;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       mask_[axis] = open[axis] ? static_cast<std::int32_t>(counts[axis]) - 1 : -1;
-      neighbours_[axis] = axisNeighbours(counts[axis], periodic[axis] || open[axis], stride);
-      // One more, always empty, is the neighbour where there is none.
-      stride *= axis < 2 ? counts[axis] + 1 : counts[axis];
+      const bool wraps = periodic[axis] || open[axis];
+      neighbours_[axis] = axisNeighbours(counts[axis], wraps, stride);
+      // One more, always empty, is the neighbour where there is none. A single plane that nobody
+      // leaves is never asked for its neighbours.
+      stride *= axis < 2 || counts[axis] > 1 || wraps ? counts[axis] + 1 : 1;
     }
     cells_.resize(stride);
   }
@@ -157,23 +159,21 @@ class CellLevel {
 
   /// Adds the members of the 27 cells around `c`, and the guests there if `with_guests`.
   void gather(const CellCoordinates& c, bool with_guests, Candidates& candidates) const {
-    gatherCells<3, 3>(neighbours(0, c[0]).cell.data(), neighbours(1, c[1]).cell.data(),
-                      sideOf(neighbours(2, c[2])), with_guests, candidates);
+    const Block<3> cells{neighbours(0, c[0]).cell, neighbours(1, c[1]).cell, neighbours(2, c[2])};
+    gatherBlock(cells, with_guests, candidates);
   }
 
-  /// The same of their layer at `direction` (0 lower, 2 upper) of `axis` alone.
-  void gatherLayer(const CellCoordinates& c, std::size_t axis, std::size_t direction,
-                   bool with_guests, Candidates& candidates) const {
-    const std::uint32_t* const x = neighbours(0, c[0]).cell.data();
-    const std::uint32_t* const y = neighbours(1, c[1]).cell.data();
-    const AxisNeighbours& z = neighbours(2, c[2]);
-    if (axis == 0) {
-      gatherCells<1, 3>(x + direction, y, sideOf(z), with_guests, candidates);
-    } else if (axis == 1) {
-      gatherCells<3, 1>(x, y + direction, sideOf(z), with_guests, candidates);
-    } else {
-      gatherCells<3, 3>(x, y, layerOf(z, direction), with_guests, candidates);
-    }
+  /// The same of their layer at `direction` (-1 lower, +1 upper) of `axis` alone.
+  void gatherLayer(const CellCoordinates& c, std::size_t axis, int direction, bool with_guests,
+                   Candidates& candidates) const {
+    // Not by a branch on the axis, which cannot be foretold.
+    constexpr std::array<std::uint8_t, 3> kAlong = {1, 0, 0}, kAcross = {2, 2, 1};
+    const std::size_t along = kAlong[axis], across = kAcross[axis];
+    const std::size_t side = static_cast<std::size_t>(1 + direction);
+    const Block<1> cells{neighbours(along, c[along]).cell,
+                         {neighbours(axis, c[axis]).cell[side]},
+                         neighbours(across, c[across])};
+    gatherBlock(cells, with_guests, candidates);
   }
 
   std::size_t bytes() const {
@@ -185,67 +185,65 @@ class CellLevel {
   }
 
  private:
-  // Cells along one axis, as parts of indices: from one, up to another.
-  struct Side {
-    const std::uint32_t* begin;
-    const std::uint32_t* end;
+  // Adjacent cells: parts of their indices along three axes, in any order of the axes.
+  template <std::size_t kRows>
+  struct Block {
+    std::array<std::uint32_t, 3> columns;
+    std::array<std::uint32_t, kRows> rows;
+    const AxisNeighbours& planes;  // those that there are
+
+    // Calls f with each cell's row, and its column there, whose sum is its index.
+    template <class Function>
+    void forEach(Function f) const {
+      const std::size_t x0 = columns[0], x1 = columns[1], x2 = columns[2];
+      const std::array<std::uint32_t, kRows> y = rows;
+      const std::size_t end = planes.end;
+      for (std::size_t k = planes.begin; k != end; ++k) {
+        const std::uint32_t z = planes.cell[k];
+        for (const std::uint32_t row : y) {
+          f(z + row, x0);
+          f(z + row, x1);
+          f(z + row, x2);
+        }
+      }
+    }
   };
 
-  static Side sideOf(const AxisNeighbours& near) {
-    return {near.cell.data() + near.begin, near.cell.data() + near.end};
-  }
-  static Side layerOf(const AxisNeighbours& near, std::size_t direction) {
-    const bool is_there = near.begin <= direction && direction < near.end;
-    return {near.cell.data() + direction, near.cell.data() + direction + (is_there ? 1 : 0)};
-  }
-
-  // What 27 cells are copied to, all of each.
-  static constexpr std::size_t kMostInPlace = 27 * sizeof(Cell) / sizeof(Slot);
-
-  template <std::size_t kColumns, std::size_t kRows>
-  void gatherCells(const std::uint32_t* columns, const std::uint32_t* rows, Side planes,
-                   bool with_guests, Candidates& candidates) const {
-    candidates.reserve(kMostInPlace);
-    std::array<std::uint32_t, kColumns> x;
-    std::array<std::uint32_t, kRows> y;
-    std::copy_n(columns, kColumns, x.begin());
-    std::copy_n(rows, kRows, y.begin());
+  template <std::size_t kRows>
+  void gatherBlock(const Block<kRows>& block, bool with_guests, Candidates& candidates) const {
+    candidates.reserve(9 * kRows * sizeof(Cell) / sizeof(Slot));
     const Cell* const cells = cells_.data();
     Slot* const begin = candidates.slots.data() + candidates.count;
     Slot* at = begin;
     unsigned is_chained = 0;
-    for (const std::uint32_t* z = planes.begin; z != planes.end; ++z) {
-      for (std::size_t j = 0; j < kRows; ++j) {
-        const Cell* const row = cells + *z + y[j];
-        for (std::size_t i = 0; i < kColumns; ++i) {
-          const Cell& cell = row[x[i]];
-          // One copy of the whole cell; what is too much is overwritten by the next.
-          std::memcpy(at, &cell, sizeof(Cell));
-          at += cell.in_place;
-          is_chained |= cell.is_chained;
-        }
-      }
-    }
+    block.forEach([&](std::size_t row, std::size_t column) {
+      const Cell* const cell = cells + row + column;
+      // All is copied, without asking what there is: what is too much is overwritten by the next.
+      std::memcpy(at, cell, sizeof(Cell));
+      at += cell->in_place;
+      is_chained |= cell->is_chained;
+    });
     candidates.count += static_cast<std::size_t>(at - begin);
-    if (is_chained == 0 && !with_guests) return;
-    for (const std::uint32_t* z = planes.begin; z != planes.end; ++z) {
-      for (const std::uint32_t row : y) {
-        for (const std::uint32_t column : x) {
-          const std::uint32_t cell = *z + row + column;
-          if (cells_[cell].is_chained) gatherChain(cells_[cell], candidates);
-          if (with_guests) gatherGuests(cell, candidates);
-        }
-      }
+    if (is_chained != 0) gatherChains(block, candidates);
+    if (!with_guests) return;
+    block.forEach([&](std::size_t row, std::size_t column) {
+      for (Slot s = guests_[row + column]; s != kNoSlot; s = next_[s]) candidates.add(s);
+    });
+  }
+
+  // What cells hold beyond the first few. Which have more cannot be foretold either.
+  template <std::size_t kRows>
+  void gatherChains(const Block<kRows>& block, Candidates& candidates) const {
+    std::array<Slot, 9 * kRows + 1> heads;
+    std::size_t count = 0;
+    block.forEach([&](std::size_t row, std::size_t column) {
+      const Cell& cell = cells_[row + column];
+      heads[count] = cell.slots.back();
+      count += cell.is_chained;
+    });
+    for (std::size_t i = 0; i < count; ++i) {
+      for (Slot s = next_[heads[i]]; s != kNoSlot; s = next_[s]) candidates.add(s);
     }
-  }
-
-  void gatherGuests(std::uint32_t cell, Candidates& candidates) const {
-    for (Slot s = guests_[cell]; s != kNoSlot; s = next_[s]) candidates.add(s);
-  }
-
-  // What a cell holds beyond the first few.
-  void gatherChain(const Cell& cell, Candidates& candidates) const {
-    for (Slot s = next_[cell.slots.back()]; s != kNoSlot; s = next_[s]) candidates.add(s);
   }
 
   void unlinkFromChain(Slot slot, Cell& cell) {
@@ -453,19 +451,17 @@ class CellGrid {
     candidates.close();
   }
 
-  /// The same, but only the layer of cells that came near by a crossing along `axis`, on the levels
-  /// where cells were crossed at all.
-  /// @param unwrapped  the coordinates after the crossing, `after` before it was put back into the
-  ///                   periodic box
-  void gatherNewLayer(const CellCoordinates& before, const CellCoordinates& unwrapped,
-                      const CellCoordinates& after, std::size_t level, std::size_t axis,
+  /// The same, but only the layer of cells that came near by a crossing along `axis` towards
+  /// `direction` (-1 or +1), on the levels where cells were crossed at all.
+  void gatherNewLayer(const CellCoordinates& before, const CellCoordinates& after,
+                      std::size_t level, std::size_t axis, int direction,
                       Candidates& candidates) const {
     candidates.count = 0;
-    const std::size_t direction = unwrapped[axis] > before[axis] ? 2 : 0;
     const CellLevel& own = levels_[level];
     own.gatherLayer(after, axis, direction, own.hasGuests(), candidates);
     for (std::size_t m = 0; m < level; ++m) {
-      if (inLevel(unwrapped, level, m)[axis] == inLevel(before, level, m)[axis]) continue;
+      const int shift = own.depth() - levels_[m].depth();
+      if ((before[axis] + direction) >> shift == before[axis] >> shift) continue;
       levels_[m].gatherLayer(inLevel(after, level, m), axis, direction, false, candidates);
     }
     candidates.close();
@@ -475,8 +471,8 @@ class CellGrid {
   void foreseeNewLayer(const CellCoordinates& before, std::size_t level, std::size_t axis,
                        int direction, Candidates& candidates) const {
     candidates.count = 0;
-    levels_[level].gatherLayer(behind(before, level, axis, direction), axis, direction > 0 ? 2 : 0,
-                               false, candidates);
+    levels_[level].gatherLayer(behind(before, level, axis, direction), axis, direction, false,
+                               candidates);
   }
 
   std::size_t bytes() const {

@@ -637,14 +637,13 @@ class EventDriven final : public Method {
   void cross(Slot slot) {
     Agenda<Real>& agenda = agendas_[slot];
     const CellCoordinates before = agenda.cell;
-    agenda.cell[agenda.crossing_axis] += agenda.crossing_direction;
-    const CellCoordinates unwrapped = agenda.cell;
-    wrapCrossing(slot);
-    grid_.move(slot, before, agenda.cell, agenda.crossing_axis, agenda.level);
+    const std::size_t axis = agenda.crossing_axis;
+    const int direction = agenda.crossing_direction;
+    enterCell(slot, axis, before[axis] + direction);
+    grid_.move(slot, before, agenda.cell, axis, agenda.level);
     if (!images_.empty()) return search(slot);  // other images are in reach now, too
     Found found{agenda.impact_time, agenda.partner};
-    grid_.gatherNewLayer(before, unwrapped, agenda.cell, agenda.level, agenda.crossing_axis,
-                         candidates_);
+    grid_.gatherNewLayer(before, agenda.cell, agenda.level, axis, direction, candidates_);
     considerBalls(seekerAt(slot, {}), {candidates_.slots.data(), candidates_.count}, found);
     considerWallsOf(slot, found);
     if (found.time < agenda.impact_time) setImpact(slot, found);
@@ -653,22 +652,22 @@ class EventDriven final : public Method {
   }
 
   // A ball that left the periodic box comes in again on the other side.
-  void wrapCrossing(Slot slot) {
+  void enterCell(Slot slot, std::size_t axis, std::int32_t coordinate) {
     Agenda<Real>& agenda = agendas_[slot];
-    const std::size_t k = agenda.crossing_axis;
-    const int axis = agenda.crossing_axis;
-    if (grid_.axis(k).periodic) {
-      const std::int32_t count = grid_.count(k, agenda.level);
-      if (agenda.cell[k] < 0) {
-        agenda.cell[k] = count - 1;
-        bodies_[slot].x[axis] += period_[axis];
-      } else if (agenda.cell[k] == count) {
-        agenda.cell[k] = 0;
-        bodies_[slot].x[axis] -= period_[axis];
+    const int k = static_cast<int>(axis);
+    if (grid_.axis(axis).periodic) {
+      const std::int32_t count = grid_.count(axis, agenda.level);
+      if (coordinate < 0) {
+        coordinate = count - 1;
+        bodies_[slot].x[k] += period_[k];
+      } else if (coordinate == count) {
+        coordinate = 0;
+        bodies_[slot].x[k] -= period_[k];
       }
-    } else if (agenda.cell[k] > kFarthestCell || agenda.cell[k] < -kFarthestCell) {
+    } else if (coordinate > kFarthestCell || coordinate < -kFarthestCell) {
       throw std::range_error("ball " + std::to_string(agenda.id) + " has flown 2^30 cells away");
     }
+    agenda.cell[axis] = coordinate;
   }
 
   Impacting<Real> impacting(Slot slot) {
@@ -1105,30 +1104,30 @@ class EventDriven final : public Method {
     }
   }
 
-  // Without a branch on signs, and with one division: a/b < c/d is tested as a d < c b.
+  // Without branches: which way out comes first cannot be foretold.
   void findCrossingFlying(Slot slot) {
     Agenda<Real>& agenda = agendas_[slot];
     const Vec x = positionNow(slot);
     const Vec& v = bodies_[slot].v;
-    std::array<Real, 3> gap{};
-    std::array<Real, 3> speed{};
     const Lattice<Real>& cubes = cubesOf(slot);
     const CellCoordinates& cube = cubeOf(slot);
+    std::array<Real, 3> wait;
     for (std::size_t k = 0; k < 3; ++k) {
       const int i = static_cast<int>(k);
       const Real from_middle = x[i] - (cubes.first[k] + Real(cube[k]) * cubes.spacing[k]);
       const Real towards = cubes.half[k] - from_middle * std::copysign(Real(1), v[i]);
-      gap[k] = std::max(towards, std::numeric_limits<Real>::min());
-      speed[k] = std::abs(v[i]);
+      wait[k] = std::max(towards, std::numeric_limits<Real>::min()) / std::abs(v[i]);
     }
     if (cubes.has_ends) {
       for (std::size_t k = 0; k < 3; ++k) {  // where there is no way out
-        if (cube[k] == cubes.end[k][v[static_cast<int>(k)] < 0 ? 0 : 1]) speed[k] = 0;
+        if (cube[k] == cubes.end[k][v[static_cast<int>(k)] < 0 ? 0 : 1]) wait[k] = kNever<Real>;
       }
     }
-    std::size_t k = gap[1] * speed[0] < gap[0] * speed[1] ? 1 : 0;
-    k = gap[2] * speed[k] < gap[k] * speed[2] ? 2 : k;
-    agenda.crossing_time = now_ + gap[k] / speed[k];
+    const Real sooner = std::min(wait[0], wait[1]);
+    const unsigned second = wait[1] < wait[0] ? 1 : 0;
+    const unsigned third = wait[2] < sooner ? 1 : 0;
+    const unsigned k = 2 * third + (second & ~third);
+    agenda.crossing_time = now_ + std::min(sooner, wait[2]);
     agenda.crossing_axis = static_cast<std::uint8_t>(k);
     agenda.crossing_direction = v[static_cast<int>(k)] < 0 ? -1 : 1;
   }
