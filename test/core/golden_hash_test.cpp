@@ -77,6 +77,15 @@ TestScene fallingAmongWalls() {
   return scene;
 }
 
+/// Under the open sky: only a floor, and where there are balls is where there are cells.
+TestScene onAFloor() {
+  TestScene scene = lattice(6, 6, 0.46875);
+  scene.surroundings.box = {};
+  scene.surroundings.box.min.z() = 0;
+  scene.surroundings.gravity = Vector3(0, 0, -4);
+  return scene;
+}
+
 /// Between large balls lie small ones on the edges of their cubes, and specks at the corners.
 TestScene mixedSizes() {
   TestScene scene = lattice(4, 4, 0.4375);
@@ -140,6 +149,7 @@ INSTANTIATE_TEST_SUITE_P(
         Golden{"dense", [] { return periodic(lattice(6, 6, 0.453125)); }, 4, 0x744070d61902f627,
                0x5e41255ead5d2aa7},
         Golden{"falling_among_walls", fallingAmongWalls, 2, 0xf1fe5b1efbd060e8, 0x0af4b54a06c4face},
+        Golden{"on_a_floor", onAFloor, 4, 0xb1547dae868a2178, 0x8af94c78286e7241},
         Golden{"mixed_sizes", mixedSizes, 4, 0xb90938fe47bbe18d, 0x73a959d0c492fc54},
         // Two cells along each axis: several images of a ball are in reach.
         Golden{"small_periodic", [] { return periodic(lattice(2, 2, 0.4375)); }, 8,

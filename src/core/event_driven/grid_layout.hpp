@@ -47,6 +47,20 @@ void extent(const Surroundings& surroundings, const std::vector<GridBall<Real>>&
   if (!std::isfinite(surroundings.box.max[axis])) high = std::max(most, low);
 }
 
+// The positive root of a number, by Newton's method: the same bits with any mathematical library.
+template <class Real>
+Real root(Real number, int degree) {
+  if (!(number > 0 && std::isfinite(number))) return number;
+  int exponent = 0;
+  std::frexp(number, &exponent);
+  Real x = std::ldexp(Real(1), exponent / degree);  // within a factor of 2 ^ 1.5
+  for (int step = 0; step < 8; ++step) {
+    const Real power = degree == 2 ? x : x * x;
+    x += (number / power - x) / Real(degree);
+  }
+  return x;
+}
+
 }  // namespace detail
 
 template <class Real>
@@ -104,7 +118,6 @@ template <class Real>
 CellGrid<Real> layOutGrid(const Surroundings& surroundings,
                           const std::vector<GridBall<Real>>& balls, Real room) {
   using std::floor;
-  using std::pow;
   std::array<GridAxis<Real>, 3> axes;
   const int dimension = surroundings.planar() ? 2 : 3;
   std::array<Real, 3> low{};
@@ -129,7 +142,7 @@ CellGrid<Real> layOutGrid(const Surroundings& surroundings,
     edge = std::max(edge, Real(2 * ball.radius * Real(kCellMargin) + room));
   }
   const Real roomiest = Real(balls.size()) / Real(kBallsPerCell) + 1;  // cells
-  edge = std::max(edge, pow(volume / roomiest, 1 / Real(dimension)));
+  edge = std::max(edge, detail::root(volume / roomiest, dimension));
   if (!(edge > 0)) edge = 1;
   const auto cut = [&](std::size_t k) { return std::max(Real(1), floor(length[k] / edge)); };
   while (cut(0) * cut(1) * (dimension == 3 ? cut(2) : Real(1)) > 2 * roomiest) edge *= Real(1.25);
