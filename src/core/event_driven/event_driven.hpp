@@ -1179,7 +1179,6 @@ class EventDriven final : public Method {
   }
 
   static constexpr Real kEventsPerBucket = 4;
-  static constexpr std::size_t kCachedBalls = 4000;         // fit into a core's own caches
   static constexpr std::uint64_t kCrossingsPerLayout = 16;  // a ball
   static constexpr std::int32_t kFarthestCell = 1 << 30;
 

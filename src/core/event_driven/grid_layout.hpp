@@ -13,7 +13,12 @@ namespace ball_sim::core {
 /// Cells are wider than the balls by this, more than rounding ever moves a ball out of its cell.
 constexpr double kCellMargin = 1 + 1e-9;
 
-/// Balls per cell of a dilute scene; wider cells are crossed less often, but show more balls.
+/// So many balls fit, with all about them, into a core's own caches.
+constexpr std::size_t kCachedBalls = 4000;
+
+/// Balls per cell of a dilute scene, in the caches and beyond; wider cells are crossed less often,
+/// but show more balls, and narrower ones take more memory.
+constexpr double kBallsPerCachedCell = 0.35;
 constexpr double kBallsPerCell = 0.5;
 
 /// What the layout needs to know of a ball.
@@ -141,7 +146,8 @@ CellGrid<Real> layOutGrid(const Surroundings& surroundings,
   for (const GridBall<Real>& ball : balls) {
     edge = std::max(edge, Real(2 * ball.radius * Real(kCellMargin) + room));
   }
-  const Real roomiest = Real(balls.size()) / Real(kBallsPerCell) + 1;  // cells
+  const Real per_cell = Real(balls.size() > kCachedBalls ? kBallsPerCell : kBallsPerCachedCell);
+  const Real roomiest = Real(balls.size()) / per_cell + 1;  // cells
   edge = std::max(edge, detail::root(volume / roomiest, dimension));
   if (!(edge > 0)) edge = 1;
   const auto cut = [&](std::size_t k) { return std::max(Real(1), floor(length[k] / edge)); };
