@@ -451,17 +451,17 @@ class CellGrid {
     candidates.close();
   }
 
-  /// The same, but only the layer of cells that came near by a crossing along `axis` towards
-  /// `direction` (-1 or +1), on the levels where cells were crossed at all.
-  void gatherNewLayer(const CellCoordinates& before, const CellCoordinates& after,
-                      std::size_t level, std::size_t axis, int direction,
-                      Candidates& candidates) const {
+  /// The same, but only the layer of cells that came near when the ball crossed into these
+  /// coordinates along `axis` towards `direction` (-1 or +1), on the levels where cells were
+  /// crossed at all.
+  void gatherNewLayer(const CellCoordinates& after, std::size_t level, std::size_t axis,
+                      int direction, Candidates& candidates) const {
     candidates.count = 0;
     const CellLevel& own = levels_[level];
     own.gatherLayer(after, axis, direction, own.hasGuests(), candidates);
     for (std::size_t m = 0; m < level; ++m) {
       const int shift = own.depth() - levels_[m].depth();
-      if ((before[axis] + direction) >> shift == before[axis] >> shift) continue;
+      if ((after[axis] - direction) >> shift == after[axis] >> shift) continue;
       levels_[m].gatherLayer(inLevel(after, level, m), axis, direction, false, candidates);
     }
     candidates.close();

@@ -18,40 +18,12 @@
 #include <utility>
 #include <vector>
 
-#include "ball_sim/ball.hpp"
-#include "event_driven/cell_grid.hpp"
+#include "event_driven/agenda.hpp"
 #include "event_driven/huge_page_vector.hpp"
 #include "event_driven/pair_search.hpp"
 #include "event_driven/tournament.hpp"
 
 namespace ball_sim::core {
-
-/// Instead of a previous slot in a list of the queue.
-constexpr Slot kFirst = ~Slot{0};          ///< first of its list
-constexpr Slot kNotQueued = ~Slot{0} - 1;  ///< in none
-constexpr Slot kAtHand = ~Slot{0} - 2;     ///< in the bucket at hand
-
-/// What only the ball itself needs, in one cache line of doubles: its next event, its cell, its
-/// name and mass, and its place in the queue.
-template <class Real>
-struct alignas(64) Agenda {
-  Real impact_time = kNever<Real>;    ///< s, in this year
-  Real crossing_time = kNever<Real>;  ///< s, in this year: out of its cell or region
-  double mass = 0;                    ///< kg
-  std::uint32_t partner = 0;          ///< slot of whom it meets, or a wall
-  std::uint32_t partner_version = 0;  ///< the partner's version when the impact was found
-  std::uint32_t version = 0;          ///< counts the changes of this ball's trajectory
-  BallId id = 0;
-  CellCoordinates cell = {0, 0, 0};
-  Slot next = kNoSlot;         ///< in the list of its bucket; at hand, its place there
-  Slot previous = kNotQueued;  ///< likewise, or one of the marks above
-  std::uint8_t level = 0;      ///< index into the grid's levels
-  std::uint8_t crossing_axis = 0;
-  std::int8_t crossing_direction = 0;  ///< -1 or +1
-
-  Real due() const { return std::min(impact_time, crossing_time); }
-};
-static_assert(sizeof(Agenda<double>) == 64);
 
 /// @tparam Real    double or long double
 /// @tparam Before  before(slot, slot): which of two events at one instant goes first
