@@ -142,9 +142,9 @@ TEST_P(GoldenHash, ContinuousOnTwoThreads) {
 INSTANTIATE_TEST_SUITE_P(
     Scenes, GoldenHash,
     testing::Values(
-        // Cells. Enough balls for both threads to be woken, and to be renumbered on the way.
-        Golden{"dilute", [] { return periodic(lattice(16, 16, 0.234375)); }, 16, 0x37674c5289c52135,
-               0x2938a58fb97b61cb},
+        // Cells. Enough balls for both threads to be woken, and time enough to be sorted in memory.
+        Golden{"dilute", [] { return periodic(lattice(16, 16, 0.234375)); }, 48, 0x61eed32d1a18b4f6,
+               0x961bffad6a4ba861},
         // Packing 0.39: neighbour lists.
         Golden{"dense", [] { return periodic(lattice(6, 6, 0.453125)); }, 4, 0x744070d61902f627,
                0x5e41255ead5d2aa7},

@@ -46,6 +46,7 @@
 #include "continuous/worker_pool.hpp"
 #include "event_driven/huge_page_vector.hpp"
 #include "impact.hpp"
+#include "permutation.hpp"
 
 namespace ball_sim::core {
 
@@ -645,26 +646,10 @@ class Continuous final : public Method {
     pool.run([&](unsigned w) {
       unsigned array = 0;
       forEachArray([&](auto& values) {
-        if (array++ % pool.size() == w) moveToPositions(values, workers_[w].moved);
+        if (array++ % pool.size() == w) moveToPlaces(values, positions_, workers_[w].moved);
       });
     });
     grid_.renumber();
-  }
-
-  // Cycle by cycle: what is at i belongs at positions_[i].
-  template <class Values>
-  void moveToPositions(Values& values, std::vector<bool>& moved) const {
-    moved.assign(values.size(), false);
-    for (Slot i = 0; i < values.size(); ++i) {
-      if (moved[i]) continue;
-      auto carried = values[i];
-      Slot to = i;
-      do {
-        to = positions_[to];
-        std::swap(carried, values[to]);
-        moved[to] = true;
-      } while (to != i);
-    }
   }
 
   void findImpacts(WorkerPool& pool) {

@@ -123,6 +123,11 @@ class CellLevel {
     if (hasGuests()) previous_.resize(slots, kNoSlot);
   }
 
+  void clear() {
+    std::fill(cells_.begin(), cells_.end(), Cell{});
+    std::fill(guests_.begin(), guests_.end(), kNoSlot);
+  }
+
   void link(Slot slot, std::uint32_t index) {
     Cell& cell = cells_[index];
     if (cell.in_place < Cell::kMostInPlace) {
@@ -404,6 +409,11 @@ class CellGrid {
 
   void resize(std::size_t slots) {
     for (CellLevel& level : levels_) level.resize(slots);
+  }
+
+  /// Takes all balls out.
+  void clear() {
+    for (CellLevel& level : levels_) level.clear();
   }
 
   /// Puts a ball into its level and, as a guest, into all coarser ones.

@@ -279,33 +279,46 @@ class EventDriven final : public Method {
     space_.setNearestSuffices(nearest);
     impacts_.choose(surroundings_.periodic && nearest,
                     neighbourhood_.listed() ? kSearchStep : kLanesForFew);
-    renumber(balls);
+    sortAlongCurve();
     for (const Slot slot : slots_) place(slot);
     for (const Slot slot : slots_) neighbourhood_.fillList(slot, agenda(slot));
     balls_at_layout_ = slots_.size();
-    crossings_at_layout_ = crossings_;
+    crossings_when_sorted_ = crossings_;
     ready_ = true;
     for (const Slot slot : slots_) findNextEvent(slot);
     setCalendar(estimatedEventRate());
   }
 
   // Gives the balls new slots along a space-filling curve, so that neighbours in space are
-  // neighbours in memory.
-  void renumber(const std::vector<GridBall<Real>>& balls) {
-    std::vector<std::pair<std::uint64_t, std::uint32_t>> places;  // on the curve, and in slots_
-    places.reserve(balls.size());
-    for (std::uint32_t i = 0; i < balls.size(); ++i) {
-      places.emplace_back(neighbourhood_.alongCurve(balls[i].x), i);
+  // neighbours in memory. What was found stays found.
+  // @return the new slots, by those that were
+  std::vector<Slot> sortAlongCurve() {
+    std::vector<std::pair<std::uint64_t, Slot>> along;
+    along.reserve(slots_.size());
+    for (const Slot slot : slots_) {
+      along.emplace_back(neighbourhood_.alongCurve(flights_.position(slot)), slot);
     }
-    std::sort(places.begin(), places.end());
-    std::vector<Slot> order;
-    order.reserve(places.size());
-    for (const auto& place : places) order.push_back(slots_[place.second]);
-    flights_.reorder(order);
+    std::sort(along.begin(), along.end());
+    std::vector<Slot> to(flights_.size());
+    Slot next = 0;
+    for (const auto& place : along) to[place.second] = next++;
+    for (const Slot slot : free_slots_) to[slot] = next++;
     free_slots_.clear();
-    for (std::size_t i = 0; i < places.size(); ++i) {
-      slots_[places[i].second] = static_cast<Slot>(i);
+    for (Slot& slot : slots_) {
+      Agenda<Real>& own = agenda(slot);
+      if (own.partner < kWall) {
+        if (agenda(own.partner).version == own.partner_version) {
+          own.partner = to[own.partner];
+        } else {  // stale, and so that it will be found to be so
+          own.partner = to[slot];
+          own.partner_version = own.version - 1;
+        }
+      }
     }
+    for (Slot& slot : slots_) slot = to[slot];
+    flights_.moveTo(to);
+    flights_.resize(slots_.size());
+    return to;
   }
 
   // Events per second, from the times at which half of the balls have their next one. What happens
@@ -367,14 +380,17 @@ class EventDriven final : public Method {
     for (const Slot slot : slots_) {
       if (body(slot).time < -32 * year) flights_.settle(slot);
     }
-    queue_.turnYear();
     // Balls that have mixed lie at random in memory again, which matters beyond the caches.
     if (slots_.size() > kCachedBalls &&
-        crossings_ - crossings_at_layout_ > kCrossingsPerLayout * slots_.size()) {
-      layOut();
+        crossings_ - crossings_when_sorted_ > kCrossingsPerSorting * slots_.size()) {
+      neighbourhood_.renumber(sortAlongCurve(), flights_.agendas);
+      crossings_when_sorted_ = crossings_;
+      queue_.clear();
+      for (const Slot slot : slots_) queue_.insert(slot);
     } else {
-      retuneCalendar(years);
+      queue_.turnYear();
     }
+    retuneCalendar(years);
   }
 
   void retuneCalendar(Real years) {
@@ -661,7 +677,7 @@ class EventDriven final : public Method {
   }
 
   static constexpr Real kEventsPerBucket = 4;
-  static constexpr std::uint64_t kCrossingsPerLayout = 16;  // a ball
+  static constexpr std::uint64_t kCrossingsPerSorting = 32;  // a ball
 
   Surroundings surroundings_;
   SimultaneousImpacts policy_;
@@ -678,7 +694,7 @@ class EventDriven final : public Method {
   bool ready_ = false;  // neighbourhood and queue hold all balls
   std::size_t balls_at_layout_ = 0;
   std::uint64_t crossings_ = 0;  // out of a cell or region
-  std::uint64_t crossings_at_layout_ = 0;
+  std::uint64_t crossings_when_sorted_ = 0;
 
   Time origin_;   // when this year began
   Time reached_;  // what now() tells

@@ -38,7 +38,7 @@ class EventQueue {
   EventQueue(HugePageVector<Agenda<Real>>& agendas, Before before)
       : agendas_(agendas), at_hand_(before) {}
 
-  /// Forgets all entries and sets the calendar.
+  /// Takes all balls out and sets the calendar.
   /// @param bucket_width  s
   /// @param buckets       a power of two
   void reset(Real bucket_width, std::uint32_t buckets) {
@@ -46,7 +46,13 @@ class EventQueue {
     per_width_ = 1 / bucket_width;
     buckets_ = buckets;
     year_ = bucket_width * Real(buckets);
-    heads_.assign(buckets + kFarAhead + 1, kNoSlot);  // one can look ahead without asking
+    heads_.resize(buckets + kFarAhead + 1);  // one can look ahead without asking
+    clear();
+  }
+
+  /// Takes all balls out, and begins the year anew.
+  void clear() {
+    std::fill(heads_.begin(), heads_.end(), kNoSlot);
     for (Agenda<Real>& agenda : agendas_) agenda.previous = kNotQueued;
     current_ = 0;
     at_hand_.clear();

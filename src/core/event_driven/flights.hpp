@@ -17,6 +17,7 @@
 #include "event_driven/huge_page_vector.hpp"
 #include "event_driven/pair_search.hpp"
 #include "impact.hpp"
+#include "permutation.hpp"
 
 namespace ball_sim::core {
 
@@ -53,19 +54,13 @@ struct Flights {
     if constexpr (kGravity) contacts.resize(count);
   }
 
-  /// Gives the balls the slots 0, 1, ... in the order of those that they have now.
-  void reorder(const std::vector<Slot>& order) {
-    const auto take = [&order](auto& values) {
-      if (values.empty()) return;
-      std::remove_reference_t<decltype(values)> ordered;
-      ordered.reserve(order.size());
-      for (const Slot slot : order) ordered.push_back(values[slot]);
-      values = std::move(ordered);
-    };
-    take(bodies);
-    take(agendas);
-    take(histories);
-    take(contacts.numbers());
+  /// Gives the balls other slots. @param to  by slot, a permutation
+  void moveTo(const std::vector<Slot>& to) {
+    std::vector<bool> moved;
+    moveToPlaces(bodies, to, moved);
+    moveToPlaces(agendas, to, moved);
+    moveToPlaces(histories, to, moved);
+    moveToPlaces(contacts.numbers(), to, moved);
   }
 
   bool isFixed(Slot slot) const { return std::isinf(agendas[slot].mass); }

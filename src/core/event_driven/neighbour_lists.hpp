@@ -21,6 +21,7 @@
 #include "event_driven/cell_grid.hpp"
 #include "event_driven/huge_page_vector.hpp"
 #include "event_driven/pair_search.hpp"
+#include "permutation.hpp"
 
 namespace ball_sim::core {
 
@@ -58,6 +59,23 @@ class NeighbourLists {
   void resize(std::size_t slots) {
     entries_.resize(slots * stride_ + kSearchStep);
     homes_.resize(slots);
+  }
+
+  /// The balls have got other slots.
+  /// @param to     by the slots they had, those they have; a permutation
+  /// @param slots  so many are in use
+  void renumber(const std::vector<Slot>& to, std::size_t slots) {
+    std::vector<bool> moved;
+    moveToPlaces(homes_, to, moved);
+    const HugePageVector<Slot> old = std::move(entries_);
+    entries_.assign(to.size() * stride_ + kSearchStep, 0);
+    for (std::size_t slot = 0; slot < to.size(); ++slot) {
+      const Slot* const from = &old[slot * stride_];
+      Slot* const list = &entries_[to[slot] * stride_];
+      list[0] = from[0];
+      for (std::size_t i = 1; i <= from[0]; ++i) list[i] = to[from[i]];
+    }
+    resize(slots);
   }
 
   const Slot* of(Slot slot) const { return &entries_[slot * stride_ + 1]; }

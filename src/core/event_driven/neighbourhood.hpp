@@ -85,6 +85,18 @@ class Neighbourhood {
     grid_.link(slot, agenda.cell, agenda.level);
   }
 
+  /// All balls have got other slots.
+  /// @param to       by the slots they had, those they have; a permutation
+  /// @param agendas  by the slots they have
+  void renumber(const std::vector<Slot>& to, const HugePageVector<Agenda<Real>>& agendas) {
+    grid_.clear();
+    grid_.resize(agendas.size());
+    for (Slot slot = 0; slot < agendas.size(); ++slot) {
+      grid_.link(slot, agendas[slot].cell, agendas[slot].level);
+    }
+    if (listed_) lists_.renumber(to, agendas.size());
+  }
+
   /// Takes a ball out of its cell. Lists keep it until it is placed anew or forgotten.
   void lift(Slot slot, const Agenda<Real>& agenda) {
     grid_.unlink(slot, agenda.cell, agenda.level);
