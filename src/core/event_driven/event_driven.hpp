@@ -345,7 +345,7 @@ class EventDriven final : public Method {
     while (Real(buckets) * kEventsPerBucket < 3 * Real(slots_.size())) buckets *= 2;
     const Real width = events_per_second > 0 ? kEventsPerBucket / events_per_second : Real(1);
     // Clocks restart with the calendar.
-    setClocksBack(flights_.now);
+    setClocksBack(flights_.now, kNever<Real>);
     queue_.reset(floorToThreeBits(width), buckets);
     for (const Slot slot : slots_) queue_.insert(slot);
     events_at_new_year_ = statistics_.events;
@@ -361,12 +361,12 @@ class EventDriven final : public Method {
     return ldexp(floor(8 * fraction), exponent - 3);
   }
 
-  void setClocksBack(Real by) {
+  // @param oldest  see Flights::setBack()
+  void setClocksBack(Real by, Real oldest) {
     if (by == 0) return;
     origin_ = origin_ + double(by);
-    flights_.now -= by;
     watch_.setBack(by);
-    for (const Slot slot : slots_) flights_.setBack(slot, by);
+    flights_.setBack(by, oldest);
   }
 
   // Moves all clocks back by whole years, to the next one in which anything happens.
@@ -375,18 +375,14 @@ class EventDriven final : public Method {
     const Real next = std::min(limit, queue_.earliestBeyond());
     const Real years = std::max(Real(1), std::floor(next / year));
     flights_.now = years * year;
-    setClocksBack(flights_.now);
-    // A place stored many years ago would lose digits of its time.
-    for (const Slot slot : slots_) {
-      if (body(slot).time < -32 * year) flights_.settle(slot);
-    }
+    setClocksBack(flights_.now, 32 * year);
     // Balls that have mixed lie at random in memory again, which matters beyond the caches.
     if (slots_.size() > kCachedBalls &&
         crossings_ - crossings_when_sorted_ > kCrossingsPerSorting * slots_.size()) {
       neighbourhood_.renumber(sortAlongCurve(), flights_.agendas);
       crossings_when_sorted_ = crossings_;
       queue_.clear();
-      for (const Slot slot : slots_) queue_.insert(slot);
+      for (Slot slot = 0; slot < flights_.size(); ++slot) queue_.insert(slot);
     } else {
       queue_.turnYear();
     }

@@ -15,7 +15,6 @@
 #include <cassert>
 #include <cstdint>
 #include <limits>
-#include <utility>
 #include <vector>
 
 #include "event_driven/agenda.hpp"
@@ -126,20 +125,21 @@ class EventQueue {
   void turnYear() {
     assert(in_year_ == 0);
     current_ = 0;
-    Slot slot = std::exchange(heads_[buckets_], kNoSlot);
-    while (slot != kNoSlot) {
-      const Slot next = agendas_[slot].next;
+    heads_[buckets_] = kNoSlot;
+    // In the order of memory: to follow the list would jump about in it.
+    for (Slot slot = 0; slot < agendas_.size(); ++slot) {
+      if (agendas_[slot].previous == kNotQueued) continue;
       agendas_[slot].previous = kNotQueued;
       insert(slot);
-      slot = next;
     }
   }
 
-  /// The earliest time of all events beyond the year; infinity when there are none.
+  /// The earliest time of all events, when none is in this year; infinity when there are none.
   Real earliestBeyond() const {
+    assert(in_year_ == 0);
     Real earliest = std::numeric_limits<Real>::infinity();
-    for (Slot slot = heads_[buckets_]; slot != kNoSlot; slot = agendas_[slot].next) {
-      earliest = std::min(earliest, agendas_[slot].due());
+    for (const Agenda<Real>& agenda : agendas_) {
+      if (agenda.previous != kNotQueued) earliest = std::min(earliest, agenda.due());
     }
     return earliest;
   }

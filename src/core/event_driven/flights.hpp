@@ -100,13 +100,18 @@ struct Flights {
     return {bodies[slot].v, inverseMass(slot), keeps_histories ? histories[slot] : no_history};
   }
 
-  /// Moves a ball's times back.
-  /// @param by  s
-  void setBack(Slot slot, Real by) {
-    bodies[slot].time -= by;
-    agendas[slot].impact_time -= by;
-    agendas[slot].crossing_time -= by;
-    if (keeps_histories) histories[slot].last -= by;
+  /// Sets all clocks back.
+  /// @param by      s
+  /// @param oldest  s: places stored longer ago are stored anew, as their times would lose digits
+  void setBack(Real by, Real oldest) {
+    now -= by;
+    for (Slot slot = 0; slot < size(); ++slot) {
+      bodies[slot].time -= by;
+      agendas[slot].impact_time -= by;
+      agendas[slot].crossing_time -= by;
+      if (keeps_histories) histories[slot].last -= by;
+      if (bodies[slot].time < -oldest) settle(slot);
+    }
   }
 
   std::size_t bytes() const {
