@@ -126,8 +126,11 @@ class EventQueue {
     assert(in_year_ == 0);
     current_ = 0;
     heads_[buckets_] = kNoSlot;
-    // In the order of memory: to follow the list would jump about in it.
+    // In the order of memory, where to follow the list would jump about; what is at random are the
+    // buckets, fetched some balls ahead.
+    const auto last = static_cast<Slot>(agendas_.size()) - 1;
     for (Slot slot = 0; slot < agendas_.size(); ++slot) {
+      __builtin_prefetch(&heads_[bucketOf(agendas_[std::min(slot + 16, last)].due())]);
       if (agendas_[slot].previous == kNotQueued) continue;
       agendas_[slot].previous = kNotQueued;
       insert(slot);
