@@ -280,6 +280,7 @@ class EventDriven final : public Method {
     impacts_.choose(surroundings_.periodic && nearest,
                     neighbourhood_.listed() ? kSearchStep : kLanesForFew);
     sortAlongCurve();
+    flights_.shrink();
     for (const Slot slot : slots_) place(slot);
     for (const Slot slot : slots_) neighbourhood_.fillList(slot, agenda(slot));
     balls_at_layout_ = slots_.size();

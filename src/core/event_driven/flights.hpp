@@ -63,6 +63,14 @@ struct Flights {
     moveToPlaces(contacts.numbers(), to, moved);
   }
 
+  /// Gives back the memory that growing has left over.
+  void shrink() {
+    bodies.shrink_to_fit();
+    agendas.shrink_to_fit();
+    histories.shrink_to_fit();
+    contacts.numbers().shrink_to_fit();
+  }
+
   bool isFixed(Slot slot) const { return std::isinf(agendas[slot].mass); }
   Real inverseMass(Slot slot) const { return 1 / Real(agendas[slot].mass); }  ///< 1/kg; 0: fixed
 
