@@ -174,7 +174,7 @@ class CellLevel {
     // Not by a branch on the axis, which cannot be foretold.
     constexpr std::array<std::uint8_t, 3> kAlong = {1, 0, 0}, kAcross = {2, 2, 1};
     const std::size_t along = kAlong[axis], across = kAcross[axis];
-    const std::size_t side = static_cast<std::size_t>(1 + direction);
+    const auto side = static_cast<unsigned>(1 + direction);
     const Block<1> cells{neighbours(along, c[along]).cell,
                          {neighbours(axis, c[axis]).cell[side]},
                          neighbours(across, c[across])};
