@@ -145,15 +145,15 @@ class LifecycleTest(unittest.TestCase):
         stats.wait(lambda m: m.real_time_factor > 10, 'a run faster than real time')
 
     def test_overloaded_node_answers_slows_time_and_keeps_the_grid(self):
-        """A thousandfold real time is more than it can do."""
+        """A million messages of 300 balls a wall second are more than any machine publishes."""
         states = Listener('slow/ball_states', BallStates)
         stats = Listener('slow/stats', SimStats)
-        self.start('slow', scene=scene('gas'), real_time_factor=1000, state_rate=10)
+        self.start('slow', scene=scene('gas'), real_time_factor=1000, state_rate=1000)
         last = stats.wait(lambda m: m.late_frames > 0 and m.simulated_time > 1, 'late frames')
         self.assertLess(last.real_time_factor, 1000)
         self.assertTrue(call('slow/pause', Trigger).success)
-        stamps = [m.header.stamp.to_nsec() for m in states.messages()]
-        self.assertTrue(all(stamp % 10**8 == 0 for stamp in stamps))
+        stamps = [m.header.stamp.to_nsec() for m in states.wait_count(1)]
+        self.assertTrue(all(stamp % 10**6 == 0 for stamp in stamps))
 
     def test_step_ends_at_the_wall_timeout(self):
         self.start('long', scene=scene('gas'), wall_timeout=0.1, start_paused=True)
