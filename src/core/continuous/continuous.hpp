@@ -345,7 +345,8 @@ class Continuous final : public Method {
   // --- impacts in turn
 
   void takeBalls(const Impact<Real>& found) {
-    const Outcome<Real> outcome = foresee(found, balls_);
+    Outcome<Real> outcome;
+    foresee(found, balls_, outcome);
     if (outcome.happens()) {
       watchBalls(outcome);
       if (log_ != nullptr) {

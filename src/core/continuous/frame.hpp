@@ -88,8 +88,8 @@ class Frame {
   /// @param seen  periods from where the grid has b to the image that was found
   Turns turnsBetween(const Path<Real>& a, const Path<Real>& b,
                      const std::array<int, 3>& seen) const {
-    const std::array<int, 3> own = turnsInGrid(swept(a), positions_[a.slot]);
-    const std::array<int, 3> others = turnsInGrid(swept(b), positions_[b.slot]);
+    const std::array<int, 3> own = turnsInGrid(a);
+    const std::array<int, 3> others = turnsInGrid(b);
     Turns turns{};
     for (std::size_t k = 0; k < 3; ++k) {
       turns[k] = static_cast<std::int16_t>(seen[k] + others[k] - own[k]);
@@ -242,6 +242,9 @@ class Frame {
   }
 
   // So many periods lies the image that the grid has of a ball from the one that its body tells.
+  std::array<int, 3> turnsInGrid(const Path<Real>& path) const {
+    return turnsInGrid(swept(path), positions_[path.slot]);
+  }
   std::array<int, 3> turnsInGrid(const SweptBall& ball, std::size_t position) const {
     std::array<int, 3> turns = {0, 0, 0};
     const std::array<double, 3> middle = grid_.middleAt(position);

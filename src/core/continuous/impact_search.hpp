@@ -97,9 +97,10 @@ class ImpactSearch {
   /// @param fetch  is called with the slot of each, to ask for more
   template <class Fetch>
   void identify(Searcher<Real>& searcher, const Fetch& fetch) const {
+    const SweptGrid& grid = frame_.grid();
     std::size_t kept = 0;
     for (Pair& pair : searcher.pairs) {
-      pair.other = frame_.grid().slotAt(pair.other);
+      pair.other = grid.slotAt(pair.other);
       if (pair.other == pair.slot) continue;
       touch(&balls_.bodies[pair.other]);
       fetch(pair.other);
@@ -205,13 +206,12 @@ class ImpactSearch {
   // Notes where a search has found others, and asks memory who they are.
   void noteHits(Slot slot, Searcher<Real>& searcher) const {
     const SweptGrid& grid = frame_.grid();
+    const bool one_image_is_near = frame_.oneImageIsNear();
     for (std::size_t i = 0; i < searcher.search.count; ++i) {
       const LaneHit& hit = searcher.search.hits[i];
       grid.fetchSlot(hit.lane);
       searcher.pairs.push_back({slot, hit.lane, {0, 0, 0}});
-      if (!frame_.oneImageIsNear()) {
-        searcher.pairs.back().turns = grid.imageOf(hit, searcher.search);
-      }
+      if (!one_image_is_near) searcher.pairs.back().turns = grid.imageOf(hit, searcher.search);
     }
   }
 

@@ -107,19 +107,21 @@ struct Outcome {
   Real reach() const { return sides[0].body.radius + sides[1].body.radius; }  ///< m
 };
 
-/// What an impact of two balls leads to, if they go on as they are.
+/// Computes what an impact of two balls leads to, if they go on as they are.
+/// @param outcome  is set (large, so it is written in place)
 template <class Real, bool kGravity>
-Outcome<Real> foresee(Impact<Real> impact, const Balls<Real, kGravity>& balls) {
+void foresee(Impact<Real> impact, const Balls<Real, kGravity>& balls, Outcome<Real>& outcome) {
   if (balls.cards[impact.b].id < balls.cards[impact.a].id) {
     std::swap(impact.a, impact.b);
     std::swap(impact.version_a, impact.version_b);
     for (std::int16_t& turns : impact.image) turns = static_cast<std::int16_t>(-turns);
   }
-  const auto before = [&](Slot slot) -> Side<Real> {
-    return {balls.bodyAt(slot, impact.time), balls.cards[slot]};
-  };
-  Outcome<Real> outcome{impact, {before(impact.a), before(impact.b)}, {}};
+  outcome.impact = impact;
   auto& [a, b] = outcome.sides;
+  a.body = balls.bodyAt(impact.a, impact.time);
+  b.body = balls.bodyAt(impact.b, impact.time);
+  a.card = balls.cards[impact.a];
+  b.card = balls.cards[impact.b];
   VectorOf<Real> dx = b.body.x - a.body.x;
   if (balls.box.repeats()) dx += balls.box.shiftOf(impact.image);
   const VectorOf<Real> pressing = balls.acceleration(impact.a) - balls.acceleration(impact.b);
@@ -131,7 +133,6 @@ Outcome<Real> foresee(Impact<Real> impact, const Balls<Real, kGravity>& balls) {
   a.card.met = b.card.id;
   b.card.met = a.card.id;
   a.card.met_normal = b.card.met_normal = outcome.passed.normal;
-  return outcome;
 }
 
 }  // namespace ball_sim::core::continuous

@@ -86,7 +86,7 @@ class Plans {
                 Heap& waiting) {
     if (left_ == 0) return;
     for (const Pair& pair : searcher.pairs) {
-      if (isPlanned(pair.other) && isMet(path, pair)) end(plan_of_[pair.other], now, waiting);
+      if (isPlanned(pair.other) && isMet(path, pair)) finish(plan_of_[pair.other], now, waiting);
     }
     for (const Pair& pair : searcher.pairs) {
       if (!isPlanned(pair.other)) continue;
@@ -217,7 +217,7 @@ class Plans {
 
   void draw(std::size_t i) {
     Plan& plan = plans_[i];
-    plan.outcome = foresee(lone_[i], balls_);
+    foresee(lone_[i], balls_, plan.outcome);
     plan.state = State::open;
     for (std::size_t side = 0; side < 2; ++side) {
       Side<Real>& after = plan.outcome.sides[side];
@@ -277,7 +277,8 @@ class Plans {
            search_.meeting(path, balls_.pathOf(pair.other), pair.turns).time <= slice_end_;
   }
 
-  void end(std::uint32_t index, const Impact<Real>& now, Heap& waiting) {
+  // Ends a plan at an impact of now.
+  void finish(std::uint32_t index, const Impact<Real>& now, Heap& waiting) {
     if (before_(plans_[index].outcome.impact, now)) {
       comeTrue(plans_[index]);
     } else {
@@ -285,7 +286,7 @@ class Plans {
     }
   }
 
-  // Ends a plan, if it has not been before: its impact waits for its turn.
+  // Puts the impact of a plan among those that wait for their turn, if it is not there yet.
   void drop(std::uint32_t index, Heap& waiting) {
     Plan& plan = plans_[index];
     if (plan.state == State::dropped) return;
