@@ -123,6 +123,28 @@ TEST(Continuous, isWhereItSaysWhenInterrupted) {
   EXPECT_GT(stops, 20);
 }
 
+// Eleven impacts in one slice: ten far from each other, which are planned, and the first of three
+// in a row of balls, which are taken in turn. With twelve allowed the last one may no longer
+// happen, when the plans come true before it; so it is one of these that has happened last.
+TEST(Continuous, isAtItsLastPlannedImpactWhenInterrupted) {
+  TestScene scene;
+  const double radius = 0.5;
+  const auto add = [&](double x, double y, double speed) {
+    scene.balls.push_back({Vector3(x, y, 0), Vector3(speed, 0, 0), radius, 1});
+  };
+  for (int pair = 0; pair < 10; ++pair) {
+    add(0, 10 * pair, 1);
+    add(1.05 + 0.001 * pair, 10 * pair, 0);  // after 0.05 s and more
+  }
+  add(0, -10, 1);
+  for (const double x : {1.01, 2.02, 3.1}) add(x, -10, 0);  // after 0.01, 0.02 and 0.1 s
+  Trial run(kMethod, scene);
+  ASSERT_FALSE(run.method().advanceTo(Time::fromSeconds(0.2), 12));
+  ASSERT_EQ(run.collisions().size(), 12u);
+  EXPECT_EQ(run.method().now(), run.collisions().back().time);
+  EXPECT_NEAR(run.method().now() - Time(), 0.059, 1e-15);
+}
+
 // Of every kind of scene: steps of any length, and stops at any number of impacts.
 TEST(Continuous, sameBitsForAnyFrames) {
   for (const SceneKind& kind : sceneKinds()) {

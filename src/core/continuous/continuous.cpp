@@ -8,11 +8,12 @@ std::unique_ptr<Method> makeContinuous(const Surroundings& surroundings, Precisi
                                        unsigned threads) {
   const bool falls = surroundings.gravity != Vector3::Zero();
   if (precision == Precision::long_double) {
-    if (falls) return std::make_unique<Continuous<long double, true>>(surroundings, threads);
-    return std::make_unique<Continuous<long double, false>>(surroundings, threads);
+    if (falls)
+      return std::make_unique<continuous::Continuous<long double, true>>(surroundings, threads);
+    return std::make_unique<continuous::Continuous<long double, false>>(surroundings, threads);
   }
-  if (falls) return std::make_unique<Continuous<double, true>>(surroundings, threads);
-  return std::make_unique<Continuous<double, false>>(surroundings, threads);
+  if (falls) return std::make_unique<continuous::Continuous<double, true>>(surroundings, threads);
+  return std::make_unique<continuous::Continuous<double, false>>(surroundings, threads);
 }
 
 }  // namespace ball_sim::core

@@ -273,7 +273,8 @@ class SweptGrid {
 
   // --- search
 
-  SweptSphere sphereOf(const SweptBall& ball) const {
+  // Always in place: a call for each ball of each frame costs 2 % of a run, and GCC makes it one.
+  __attribute__((always_inline)) SweptSphere sphereOf(const SweptBall& ball) const {
     return {inUnits(ball.middle[0] - axes_[0].origin), inUnits(ball.middle[1] - axes_[1].origin),
             inUnits(ball.middle[2] - axes_[2].origin),
             inUnits(ball.radius + ball.half_length) + margin_};
@@ -368,16 +369,13 @@ void SweptGrid::fill(std::size_t count, const Describe& describe, WorkerPool& po
   lanes_.resize(count);
   countWorkers(pool.size());
   margin_ = 0;
-  const auto share = [count, &pool](unsigned worker) {
-    return static_cast<std::size_t>(std::uint64_t{count} * worker / pool.size());
-  };
-  pool.run([&](unsigned w) {
+  share(pool, count, [&](std::size_t begin, std::size_t end, unsigned w) {
     Worker& worker = workers_[w];
     worker.ends.assign(std::size_t{cells_} + 1, 0);
     worker.radius.assign(levels_.size(), 0);
     worker.longest = 0;
     worker.farthest = 0;
-    for (std::size_t i = share(w); i < share(w + 1); ++i) {
+    for (std::size_t i = begin; i < end; ++i) {
       const SweptBall ball = describe(i);
       const SweptSphere sphere = sphereOf(ball);
       const std::size_t level = levelOf(ball.radius);
@@ -391,9 +389,9 @@ void SweptGrid::fill(std::size_t count, const Describe& describe, WorkerPool& po
     }
   });
   sumUp();
-  pool.run([&](unsigned w) {
+  share(pool, count, [&](std::size_t begin, std::size_t end, unsigned w) {
     Worker& worker = workers_[w];
-    for (std::size_t i = share(w); i < share(w + 1); ++i) {
+    for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t p = worker.ends[keys_[i] + 1]++;
       slots_[p] = static_cast<std::uint32_t>(i);
       SweptSphere sphere = unsorted_[i];

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <condition_variable>
+#include <cstddef>
 #include <cstdint>
 #include <exception>
 #include <mutex>
@@ -49,5 +50,23 @@ class WorkerPool {
   bool quits_ = false;
   std::exception_ptr error_;
 };
+
+/// Threads for work of any size: where it is not worth waking them, the caller does it alone.
+struct WorkerPools {
+  explicit WorkerPools(unsigned workers) : all(workers), alone(1) {}
+
+  WorkerPool& forWork(std::size_t size, std::size_t worth) { return size < worth ? alone : all; }
+
+  WorkerPool all;
+  WorkerPool alone;
+};
+
+/// Shares the work on 0..count-1 among workers, in order: f(begin, end, worker).
+template <class Function>
+void share(WorkerPool& pool, std::size_t count, const Function& f) {
+  pool.run([&](unsigned worker) {
+    f(count * worker / pool.size(), count * (worker + 1) / pool.size(), worker);
+  });
+}
 
 }  // namespace ball_sim::core

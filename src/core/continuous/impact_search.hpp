@@ -1,0 +1,233 @@
+// The impacts that paths lead to within a frame.
+//
+// A search goes in three passes over a batch of balls, so that what one pass needs of memory is on
+// its way since the one before: the grid tells where others are that may be met, then who they are
+// is read, then the times of impact are computed.
+//
+// The time of an impact is computed from what the two balls have stored alone, at the later of
+// their two times: it is the same bits whenever it is asked.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "ball_sim/time_of_impact.hpp"
+#include "continuous/balls.hpp"
+#include "continuous/frame.hpp"
+#include "continuous/impacts.hpp"
+#include "continuous/swept_grid.hpp"
+#include "continuous/worker_pool.hpp"
+
+namespace ball_sim::core::continuous {
+
+/// Two balls that may meet.
+struct Pair {
+  Slot slot;
+  std::uint32_t other;       ///< its position in the grid, from identify() on its slot
+  std::array<int, 3> turns;  ///< of the image that was found; 0 where only one is near
+};
+
+/// What one thread needs to search.
+template <class Real>
+struct alignas(64) Searcher {
+  SweptSearch search;
+  std::vector<Pair> pairs;          ///< found, and not looked at yet
+  std::vector<Impact<Real>> found;  ///< to be collected
+};
+
+constexpr std::size_t kBatch = 64;  ///< searches whose memory is asked for at once
+
+/// Calls f(first, last) for batches of begin..end-1.
+template <class Function>
+void inBatches(std::size_t begin, std::size_t end, const Function& f) {
+  for (; begin < end; begin += kBatch) f(begin, std::min(begin + kBatch, end));
+}
+
+template <class Real, bool kGravity>
+class ImpactSearch {
+  using Vec = VectorOf<Real>;
+
+ public:
+  /// @param balls, frame  outlive the search
+  ImpactSearch(const Balls<Real, kGravity>& balls, const Frame<Real, kGravity>& frame,
+               unsigned threads)
+      : balls_(balls), frame_(frame), searchers_(threads) {}
+
+  /// All impacts in a frame that has just begun, each pair's from one of its ends, in the order of
+  /// the grid.
+  void findAll(WorkerPool& pool, std::vector<Impact<Real>>& impacts) {
+    share(pool, balls_.size(), [this](std::size_t begin, std::size_t end, unsigned thread) {
+      Searcher<Real>& searcher = searchers_[thread];
+      searcher.search.ahead_of = SweptSearch::kNoCell;  // of another frame
+      inBatches(begin, end, [&](std::size_t first, std::size_t last) {
+        for (std::size_t p = first; p < last; ++p) lookAhead(p, searcher);
+        identify(searcher, [](Slot) {});
+        considerPairs(searcher);
+      });
+    });
+    collect(impacts);
+  }
+
+  Searcher<Real>& searcher(unsigned thread) { return searchers_[thread]; }
+
+  /// Appends what the searchers have found.
+  void collect(std::vector<Impact<Real>>& impacts) {
+    for (Searcher<Real>& searcher : searchers_) {
+      impacts.insert(impacts.end(), searcher.found.begin(), searcher.found.end());
+      searcher.found.clear();
+    }
+  }
+
+  // --- the passes of a search
+
+  /// Finds where others are that a ball may meet on a path.
+  /// @param rest  the path in the grid
+  void lookAround(Slot slot, const SweptBall& rest, Searcher<Real>& searcher) const {
+    const SweptGrid& grid = frame_.grid();
+    for (std::size_t level = 0; level < grid.levels(); ++level) {
+      grid.findAroundLater(level, rest, searcher.search);
+      noteHits(slot, searcher);
+    }
+  }
+
+  /// Learns who they are, and asks memory for what they are.
+  /// @param fetch  is called with the slot of each, to ask for more
+  template <class Fetch>
+  void identify(Searcher<Real>& searcher, const Fetch& fetch) const {
+    const SweptGrid& grid = frame_.grid();
+    std::size_t kept = 0;
+    for (Pair& pair : searcher.pairs) {
+      pair.other = grid.slotAt(pair.other);
+      if (pair.other == pair.slot) continue;
+      touch(&balls_.bodies[pair.other]);
+      fetch(pair.other);
+      searcher.pairs[kept++] = pair;
+    }
+    searcher.pairs.resize(kept);
+  }
+
+  /// Finds the impacts of pairs as they are now.
+  void considerPairs(Searcher<Real>& searcher) const {
+    for (const Pair& pair : searcher.pairs) {
+      const Impact<Real> impact =
+          meeting(balls_.pathOf(pair.slot), balls_.pathOf(pair.other), pair.turns);
+      if (impact.time <= frame_.end()) searcher.found.push_back(impact);
+    }
+    searcher.pairs.clear();
+  }
+
+  /// Finds the impact of a ball with a wall, as it is now.
+  void considerWall(Slot slot, Searcher<Real>& searcher) const {
+    if (balls_.walls.empty()) return;
+    const Impact<Real> impact = wallImpact(balls_.pathOf(slot), balls_.wall_visits[slot]);
+    if (impact.time <= frame_.end()) searcher.found.push_back(impact);
+  }
+
+  // --- impacts of paths, if neither changes before
+
+  /// The impact of two balls. Only `time` is valid where it lies after the end of the frame.
+  /// @param turns  periods from where the grid has b to the image that was found
+  Impact<Real> meeting(const Path<Real>& a, const Path<Real>& b,
+                       const std::array<int, 3>& turns) const {
+    Impact<Real> impact;
+    impact.a = a.slot;
+    impact.b = b.slot;
+    impact.image = {0, 0, 0};
+    const Real start = std::max(a.body->time, b.body->time);
+    Vec dx = balls_.positionAt(b, start) - balls_.positionAt(a, start);
+    Vec dv = b.body->v - a.body->v;
+    Vec da = Vec::Zero();
+    if constexpr (kGravity) {
+      dv = balls_.velocityAt(b, start) - balls_.velocityAt(a, start);
+      da = balls_.accelerations[b.slot] - balls_.accelerations[a.slot];
+    }
+    if (balls_.box.repeats()) {
+      const Real later = std::max(frame_.start() - start, Real(0));
+      impact.image = frame_.oneImageIsNear()
+                         ? balls_.box.turnsToNearest(dx + later * dv + (later * later / 2) * da)
+                         : frame_.turnsBetween(a, b, turns);
+      dx += balls_.box.shiftOf(impact.image);
+    }
+    const Real reach = a.body->radius + b.body->radius;
+    if (kGravity && dot(da, da) > 0) {
+      impact.time = start + timeOfImpactAccelerated<Real>(dx, dv, da, reach);
+    } else {
+      const Real wait = timeOfImpact<Real>(dx, dv, reach);
+      const bool again = wait < kNever<Real> && haveJustMet(a, b, dx, reach);
+      impact.time = again ? kNever<Real> : start + wait;
+    }
+    if (impact.time <= frame_.end()) {
+      impact.version_a = a.card->version;
+      impact.version_b = b.card->version;
+    }
+    return impact;
+  }
+
+  /// The impact of a ball with the wall that it visits next; kNever if not in this frame.
+  Impact<Real> wallImpact(const Path<Real>& path, const WallVisit<Real>& visit) const {
+    Impact<Real> impact;
+    impact.time = kNever<Real>;
+    if (!(visit.time <= frame_.end())) return impact;
+    impact.time = visit.time;
+    impact.a = path.slot;
+    impact.b = kWall + visit.wall;
+    impact.version_a = impact.version_b = path.card->version;
+    impact.image = {0, 0, 0};
+    return impact;
+  }
+
+  std::size_t bytes() const {
+    std::size_t bytes = 0;
+    for (const Searcher<Real>& searcher : searchers_) {
+      bytes += capacityBytes(searcher.pairs) + capacityBytes(searcher.found);
+    }
+    return bytes;
+  }
+
+ private:
+  // The first pass when all are on their first paths: of a pair one looks.
+  void lookAhead(std::size_t p, Searcher<Real>& searcher) const {
+    const SweptGrid& grid = frame_.grid();
+    const Slot slot = grid.slotAt(p);
+    considerWall(slot, searcher);
+    const std::size_t level = grid.levelAt(p);
+    grid.findAhead(p, level, searcher.search);
+    noteHits(slot, searcher);
+    for (std::size_t other = 0; other < grid.levels(); ++other) {
+      if (!grid.seeks(level, other)) continue;
+      grid.findAround(other, frame_.inGrid(balls_.pathOf(slot)), searcher.search);
+      noteHits(slot, searcher);
+    }
+  }
+
+  // Notes where a search has found others, and asks memory who they are.
+  void noteHits(Slot slot, Searcher<Real>& searcher) const {
+    const SweptGrid& grid = frame_.grid();
+    const bool one_image_is_near = frame_.oneImageIsNear();
+    for (std::size_t i = 0; i < searcher.search.count; ++i) {
+      const LaneHit& hit = searcher.search.hits[i];
+      grid.fetchSlot(hit.lane);
+      searcher.pairs.push_back({slot, hit.lane, {0, 0, 0}});
+      if (!one_image_is_near) searcher.pairs.back().turns = grid.imageOf(hit, searcher.search);
+    }
+  }
+
+  // In straight relative motion two balls that have just met do not meet again. In a periodic box
+  // another image of the partner may be in reach too, but not in the same direction.
+  bool haveJustMet(const Path<Real>& a, const Path<Real>& b, const Vec& dx, Real reach) const {
+    const BallId id_a = a.card->id, id_b = b.card->id;
+    if (a.card->met != id_b || b.card->met != id_a) return false;
+    const Real along = dot(dx, a.card->met_normal);
+    return dot(dx, dx) < reach * reach * Real(1 + 1e-6) &&
+           (id_a < id_b ? along : -along) > Real(0.9) * reach;
+  }
+
+  const Balls<Real, kGravity>& balls_;
+  const Frame<Real, kGravity>& frame_;
+  std::vector<Searcher<Real>> searchers_;  // one a thread
+};
+
+}  // namespace ball_sim::core::continuous
