@@ -287,7 +287,9 @@ class Meddler {
 
   void insert(Trio& trio) {
     std::vector<Ball> balls = present(trio);
-    if (!addRandomBall(kind_, around_, random_.chance(0.1), random_, balls)) return;
+    SceneKind kind = kind_;
+    if (kind.large > 1 && random_.chance(0.3)) kind.large = balls.size() + 1;  // one more of these
+    if (!addRandomBall(kind, around_, random_.chance(0.1), random_, balls)) return;
     const BallId id = next_id_;
     next_id_ += 1 + static_cast<BallId>(random_.index(3));  // ids may have gaps
     trio.forEach([&](Trial& run) { run.method().insert(id, balls.back()); });
@@ -296,14 +298,20 @@ class Meddler {
 
   void remove(Trio& trio) {
     if (alive_.size() < 2) return;
-    const std::size_t victim = random_.index(alive_.size());
+    const std::size_t victim = someBall();
     trio.forEach([&](Trial& run) { run.method().remove(alive_[victim]); });
     alive_.erase(alive_.begin() + static_cast<std::ptrdiff_t>(victim));
   }
 
+  // One of the few large ones no less than one of the others, where there are several.
+  std::size_t someBall() {
+    const bool large = kind_.large > 1 && random_.chance(0.5);
+    return random_.index(large ? std::min(kind_.large, alive_.size()) : alive_.size());
+  }
+
   // @return the place in alive_ of a ball that can be moved, or its size
   std::size_t movable(const Trio& trio) {
-    const std::size_t chosen = alive_.empty() ? 0 : random_.index(alive_.size());
+    const std::size_t chosen = alive_.empty() ? 0 : someBall();
     const bool ok =
         chosen < alive_.size() && trio.truth.method().ball(alive_[chosen]).mass < kFixed;
     return ok ? chosen : alive_.size();

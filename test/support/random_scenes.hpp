@@ -22,10 +22,12 @@ struct SceneKind {
   Boundary boundary = Boundary::closed;
   std::size_t count = 16;
   double largest_radius = 0.08;  ///< m
+  std::size_t large = 1;         ///< so many of the balls have it
   double size_ratio = 1;         ///< largest radius : smallest radius
-  double mass_ratio = 1;         ///< masses from 1 to this, evenly in the logarithm
-  std::size_t fixed = 0;         ///< so many of the balls are fixed
-  double gravity = 0;            ///< m/s^2
+  double small_from = 0;  ///< where the others' sizes begin: a share of the ratio's logarithm
+  double mass_ratio = 1;  ///< masses from 1 to this, evenly in the logarithm
+  std::size_t fixed = 0;  ///< so many of the balls are fixed
+  double gravity = 0;     ///< m/s^2
   double restitution = 1;
   double speed = 1;           ///< m/s, standard deviation of each component
   double offset = 0;          ///< m, the whole scene lies so far from the origin along x
@@ -120,8 +122,8 @@ inline Vector3 randomVelocity(const SceneKind& kind, RandomNumbers& random) {
 inline bool addRandomBall(const SceneKind& kind, const Surroundings& around, bool fixed,
                           RandomNumbers& random, std::vector<Ball>& balls) {
   Ball ball;
-  // The first ball is one of the largest, then evenly in the logarithm.
-  const double exponent = balls.empty() ? 0 : random.uniform(0, 1);
+  // The first balls are of the largest, then evenly in the logarithm.
+  const double exponent = balls.size() < kind.large ? 0 : random.uniform(kind.small_from, 1);
   ball.radius = kind.largest_radius * std::pow(kind.size_ratio, -exponent);
   ball.mass = fixed ? kFixed : std::pow(kind.mass_ratio, random.uniform(0, 1));
   if (!fixed) ball.velocity = randomVelocity(kind, random);
@@ -161,6 +163,14 @@ inline std::vector<SceneKind> sceneKinds() {
   const auto count = [](std::size_t n) { return [n](SceneKind& k) { k.count = n; }; };
   const auto radius = [](double r) { return [r](SceneKind& k) { k.largest_radius = r; }; };
   const auto sizes = [](double ratio) { return [ratio](SceneKind& k) { k.size_ratio = ratio; }; };
+  const auto from = [](double share) { return [share](SceneKind& k) { k.small_from = share; }; };
+  const auto specks = [](std::size_t large, double ratio) {
+    return [large, ratio](SceneKind& k) {
+      k.large = large;
+      k.size_ratio = ratio;
+      k.small_from = 0.7;
+    };
+  };
   const auto masses = [](double ratio) { return [ratio](SceneKind& k) { k.mass_ratio = ratio; }; };
   const auto fixed = [](std::size_t n) { return [n](SceneKind& k) { k.fixed = n; }; };
   const auto gravity = [](double g) { return [g](SceneKind& k) { k.gravity = g; }; };
@@ -185,6 +195,26 @@ inline std::vector<SceneKind> sceneKinds() {
   add("closed_2d_ratio_1000", planar, sizes(1000), radius(0.2), count(24));
   add("closed_3d_ratio_1000", sizes(1000), radius(0.3), count(24), masses(1e6));
   add("closed_3d_ratio_10000", sizes(1e4), radius(0.3), count(24), masses(1e6));
+  // Several large balls among so many small ones that their guests' cells are halved: once, twice,
+  // three times; and with balls of a level between.
+  add("several_large_2d", planar, radius(0.2), specks(3, 100), count(100), time(0.2));
+  add("several_large_3d", radius(0.2), specks(4, 100), count(232), time(0.04));
+  add("several_large_once_halved", radius(0.2), specks(4, 30), count(74), time(0.2));
+  add("several_large_three_levels", planar, radius(0.2), specks(3, 1000), from(0.2), count(140),
+      time(0.05));
+  add("several_large_open_2d", planar, in(Boundary::open), radius(0.12), specks(4, 100), count(140),
+      time(0.2));
+  add("several_large_half_open", in(Boundary::half_open), radius(0.2), specks(4, 100), count(100),
+      time(0.1));
+  add("several_large_gravity", planar, radius(0.2), specks(3, 100), count(100), gravity(20),
+      time(0.15));
+  add("several_large_apart", planar, radius(0.12), specks(6, 100), count(140), time(0.15));
+  add("several_large_ratio_10", planar, radius(0.2), specks(3, 10), from(0.52), count(42),
+      time(0.5));
+  add("several_large_periodic_2d", planar, in(Boundary::periodic), radius(0.12), specks(4, 100),
+      count(140), time(0.06));
+  add("several_large_periodic_3d", in(Boundary::periodic), radius(0.2), specks(4, 100), count(100),
+      time(0.1));
   add("closed_3d_fixed", fixed(5), radius(0.1));
   add("closed_2d_fixed", planar, fixed(4), masses(10));
   add("closed_3d_fast", fast);

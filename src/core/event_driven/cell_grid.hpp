@@ -2,9 +2,12 @@
 //
 // Space is cut into cells, a level of them for each size class: level 0 has the coarsest, each
 // level halves the cells' edges `depth` times. A ball is a member of the finest level whose cells
-// are at least as wide as the ball, and a guest of the populated levels above. Two balls that touch
-// are then in the same or adjacent cells of the level of the larger one, so a ball looks at the
-// members of its own and all coarser levels, and at the guests of its own.
+// are at least as wide as the ball, and a guest of the populated levels above (guest_cells.hpp).
+// Two balls that touch are then in the same or adjacent cells of the level of the larger one, so a
+// ball looks at the members of its own and all coarser levels, and at the guests of its own.
+//
+// Where a ball is, is told by its home: a cell of its level, or, where many guests are, a halved
+// one, since it then looks for guests from nearer by.
 //
 // An axis is closed (cells from wall to wall), periodic, or open. On an open axis a cell index is
 // taken modulo the number of cells, so the grid reaches everywhere: balls that share a cell by
@@ -23,53 +26,19 @@
 
 #include "ball_sim/surroundings.hpp"
 #include "ball_sim/vector.hpp"
+#include "event_driven/candidates.hpp"
+#include "event_driven/cell_coordinates.hpp"
+#include "event_driven/guest_cells.hpp"
 #include "event_driven/huge_page_vector.hpp"
 #include "event_driven/pair_search.hpp"
 
 namespace ball_sim::core {
-
-/// Coordinates of a cell along the axes, in the cells of one level.
-using CellCoordinates = std::array<std::int32_t, 3>;
-
-/// The place of a cell along Morton's space-filling curve (1966), which keeps near what is near.
-inline std::uint64_t mortonKey(const CellCoordinates& c) {
-  std::uint64_t key = 0;
-  for (int bit = 0; bit < 21; ++bit) {
-    for (int axis = 0; axis < 3; ++axis) {
-      const auto coordinate = static_cast<std::uint32_t>(c[static_cast<std::size_t>(axis)]);
-      key |= std::uint64_t{(coordinate >> bit) & 1} << (3 * bit + axis);
-    }
-  }
-  return key;
-}
 
 /// The adjacent cells of one cell along one axis: lower, itself, upper.
 struct AxisNeighbours {
   std::array<std::uint32_t, 3> cell{};  ///< part of the cell's index
   std::uint8_t begin = 1;               ///< first that there is
   std::uint8_t end = 2;                 ///< behind the last
-};
-
-/// The balls found near a ball.
-struct Candidates {
-  std::vector<Slot> slots;
-  std::size_t count = 0;
-
-  /// Makes room for `more` beyond `count`.
-  void reserve(std::size_t more) {
-    if (slots.size() < count + more) slots.resize(2 * (count + more));
-  }
-
-  void add(Slot slot) {
-    reserve(1);
-    slots[count++] = slot;
-  }
-
-  /// Ends the list as PairSearch wants it: what follows are slots that there are.
-  void close() {
-    reserve(kSearchStep);
-    std::fill_n(slots.begin() + static_cast<std::ptrdiff_t>(count), kSearchStep, Slot{0});
-  }
 };
 
 /// The balls in one cell: the first few beside each other, so that they are copied without a
@@ -83,14 +52,12 @@ struct alignas(16) Cell {
   std::uint8_t is_chained = 0;  ///< 1: there are more than fit in place
 };
 
-/// One level of cells, and who is in them.
+/// One level of cells, and their members.
 class CellLevel {
  public:
-  /// @param depth  times the coarsest edges are halved
   /// @param counts cells along each axis
-  CellLevel(int depth, const std::array<std::uint32_t, 3>& counts,
-            const std::array<bool, 3>& periodic, const std::array<bool, 3>& open)
-      : depth_(depth) {
+  CellLevel(const std::array<std::uint32_t, 3>& counts, const std::array<bool, 3>& periodic,
+            const std::array<bool, 3>& open) {
     std::uint32_t stride = 1;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       mask_[axis] = open[axis] ? static_cast<std::int32_t>(counts[axis]) - 1 : -1;
@@ -103,8 +70,6 @@ class CellLevel {
     cells_.resize(stride);
   }
 
-  int depth() const { return depth_; }
-
   /// @param coordinates  in cells of this level
   std::uint32_t cellIndex(const CellCoordinates& coordinates) const {
     return neighbours(0, coordinates[0]).cell[1] + neighbours(1, coordinates[1]).cell[1] +
@@ -115,18 +80,9 @@ class CellLevel {
     return neighbours_[axis][static_cast<std::size_t>(coordinate & mask_[axis])];
   }
 
-  void expectGuests() { guests_.assign(cells_.size(), kNoSlot); }
-  bool hasGuests() const { return !guests_.empty(); }
+  void resize(std::size_t slots) { next_.resize(slots, kNoSlot); }
 
-  void resize(std::size_t slots) {
-    next_.resize(slots, kNoSlot);
-    if (hasGuests()) previous_.resize(slots, kNoSlot);
-  }
-
-  void clear() {
-    std::fill(cells_.begin(), cells_.end(), Cell{});
-    std::fill(guests_.begin(), guests_.end(), kNoSlot);
-  }
+  void clear() { std::fill(cells_.begin(), cells_.end(), Cell{}); }
 
   void link(Slot slot, std::uint32_t index) {
     Cell& cell = cells_[index];
@@ -147,29 +103,14 @@ class CellLevel {
     cell.slots[i] = cell.slots[--cell.in_place];
   }
 
-  void linkGuest(Slot slot, std::uint32_t index) {
-    const Slot head = guests_[index];
-    next_[slot] = head;
-    previous_[slot] = kNoSlot;
-    if (head != kNoSlot) previous_[head] = slot;
-    guests_[index] = slot;
-  }
-
-  void unlinkGuest(Slot slot, std::uint32_t index) {
-    const Slot after = next_[slot];
-    const Slot before = previous_[slot];
-    if (after != kNoSlot) previous_[after] = before;
-    (before != kNoSlot ? next_[before] : guests_[index]) = after;
-  }
-
-  /// Adds the members of the 27 cells around `c`, and the guests there if `with_guests`.
-  void gather(const CellCoordinates& c, bool with_guests, Candidates& candidates) const {
+  /// Adds the members of the 27 cells around `c`.
+  void gather(const CellCoordinates& c, Candidates& candidates) const {
     const Block<3> cells{neighbours(0, c[0]).cell, neighbours(1, c[1]).cell, neighbours(2, c[2])};
-    gatherBlock(cells, with_guests, candidates);
+    gatherBlock(cells, candidates);
   }
 
   /// The same of their layer at `direction` (-1 lower, +1 upper) of `axis` alone.
-  void gatherLayer(const CellCoordinates& c, std::size_t axis, int direction, bool with_guests,
+  void gatherLayer(const CellCoordinates& c, std::size_t axis, int direction,
                    Candidates& candidates) const {
     // Not by a branch on the axis, which cannot be foretold.
     constexpr std::array<std::uint8_t, 3> kAlong = {1, 0, 0}, kAcross = {2, 2, 1};
@@ -178,13 +119,11 @@ class CellLevel {
     const Block<1> cells{neighbours(along, c[along]).cell,
                          {neighbours(axis, c[axis]).cell[side]},
                          neighbours(across, c[across])};
-    gatherBlock(cells, with_guests, candidates);
+    gatherBlock(cells, candidates);
   }
 
   std::size_t bytes() const {
-    std::size_t bytes =
-        cells_.capacity() * sizeof(Cell) +
-        (guests_.capacity() + next_.capacity() + previous_.capacity()) * sizeof(Slot);
+    std::size_t bytes = cells_.capacity() * sizeof(Cell) + next_.capacity() * sizeof(Slot);
     for (const auto& axis : neighbours_) bytes += axis.capacity() * sizeof(AxisNeighbours);
     return bytes;
   }
@@ -215,7 +154,7 @@ class CellLevel {
   };
 
   template <std::size_t kRows>
-  void gatherBlock(const Block<kRows>& block, bool with_guests, Candidates& candidates) const {
+  void gatherBlock(const Block<kRows>& block, Candidates& candidates) const {
     candidates.reserve(9 * kRows * sizeof(Cell) / sizeof(Slot));
     const Cell* const cells = cells_.data();
     Slot* const begin = candidates.slots.data() + candidates.count;
@@ -230,10 +169,6 @@ class CellLevel {
     });
     candidates.count += static_cast<std::size_t>(at - begin);
     if (is_chained != 0) gatherChains(block, candidates);
-    if (!with_guests) return;
-    block.forEach([&](std::size_t row, std::size_t column) {
-      for (Slot s = guests_[row + column]; s != kNoSlot; s = next_[s]) candidates.add(s);
-    });
   }
 
   // What cells hold beyond the first few. Which have more cannot be foretold either.
@@ -278,14 +213,14 @@ class CellLevel {
     return table;
   }
 
-  int depth_;
   std::array<std::int32_t, 3> mask_{};  // of coordinates on open axes; all ones elsewhere
   std::array<std::vector<AxisNeighbours>, 3> neighbours_;
-  HugePageVector<Cell> cells_;  // members
-  std::vector<Slot> guests_;    // heads of the lists of balls of finer levels; empty without any
-  std::vector<Slot> next_;      // in a cell's chain, or a list of guests
-  std::vector<Slot> previous_;  // in a list of guests
+  HugePageVector<Cell> cells_;
+  std::vector<Slot> next_;  // in a cell's chain
 };
+
+/// Cells are wider than the balls by this, more than rounding ever moves a ball out of its cell.
+constexpr double kCellMargin = 1 + 1e-9;
 
 /// How one axis is cut.
 template <class Real>
@@ -312,30 +247,36 @@ struct Lattice {
   bool has_ends = false;  ///< whether there are any such
 };
 
+/// More are never laid out.
+constexpr std::size_t kMostLevels = 32;
+
+/// What is to be known to cut a level.
+template <class Real>
+struct LevelPlan {
+  int depth = 0;           ///< times the coarsest edges are halved, for the cells of members
+  int home_depth = 0;      ///< the same for homes and guests
+  Real largest = 0;        ///< m, radius of the largest balls
+  Real largest_guest = 0;  ///< m, of the largest balls of finer levels
+};
+
 /// All levels, and the geometry they share.
 template <class Real>
 class CellGrid {
  public:
   CellGrid() = default;
 
-  /// @param depths  of the populated levels, ascending, at least one
-  CellGrid(const std::array<GridAxis<Real>, 3>& axes, const std::vector<int>& depths)
-      : axes_(axes) {
+  /// @param plans  of the populated levels, coarsest first, at least one; in the finest, members'
+  ///               cells are homes
+  CellGrid(const std::array<GridAxis<Real>, 3>& axes, const std::vector<LevelPlan<Real>>& plans)
+      : axes_(axes), plans_(plans), finest_(plans.size() - 1) {
     const std::array<bool, 3> periodic = {axes[0].periodic, axes[1].periodic, axes[2].periodic};
     const std::array<bool, 3> open = {axes[0].open(), axes[1].open(), axes[2].open()};
-    for (const int depth : depths) {
+    for (const LevelPlan<Real>& plan : plans_) {
       std::array<std::uint32_t, 3> counts{};
-      for (std::size_t k = 0; k < 3; ++k) counts[k] = axes[k].cells << (axes[k].flat ? 0 : depth);
-      levels_.emplace_back(depth, counts, periodic, open);
-    }
-    for (std::size_t i = 0; i + 1 < levels_.size(); ++i) levels_[i].expectGuests();
-    for (std::size_t level = 0; level < levels_.size(); ++level) {
-      lattices_.push_back(lattice(levels_[level].depth()));
-      for (std::size_t k = 0; k < 3; ++k) {
-        lattices_[level].has_ends |= axes_[k].lower_wall || axes_[k].upper_wall;
-        if (axes_[k].lower_wall) lattices_[level].end[k][0] = 0;
-        if (axes_[k].upper_wall) lattices_[level].end[k][1] = count(k, level) - 1;
-      }
+      for (std::size_t k = 0; k < 3; ++k) counts[k] = cells(k, plan.depth);
+      levels_.emplace_back(counts, periodic, open);
+      if (levels_.size() <= finest_) guests_.push_back(guestCells(plan));
+      addLattice(plan);
     }
   }
 
@@ -360,21 +301,31 @@ class CellGrid {
   const Lattice<Real>& latticeOf(std::size_t level) const { return lattices_[level]; }
 
   const GridAxis<Real>& axis(std::size_t k) const { return axes_[k]; }
-  std::vector<CellLevel>& levels() { return levels_; }
-  const std::vector<CellLevel>& levels() const { return levels_; }
+  std::size_t finestLevel() const { return finest_; }
 
   /// Edge of a cell, m.
-  Real edge(std::size_t axis, std::size_t level) const { return lattices_[level].spacing[axis]; }
-
-  /// Number of cells from end to end of a bounded axis.
-  std::int32_t count(std::size_t axis, std::size_t level) const {
-    return static_cast<std::int32_t>(axes_[axis].cells << levels_[level].depth());
+  Real edge(std::size_t axis, std::size_t level) const {
+    using std::ldexp;
+    return ldexp(axes_[axis].edge, -plans_[level].depth);
   }
 
-  /// Whether a box face bounds the cells at a coordinate, towards `direction` (-1 or +1).
+  /// Depth of the homes of a level's members.
+  int homeDepth(std::size_t level) const { return plans_[level].home_depth; }
+
+  /// Radius of the largest balls that a level takes, m.
+  Real largestRadius(std::size_t level) const { return plans_[level].largest; }
+
+  /// Number of homes from end to end of a bounded axis.
+  std::int32_t count(std::size_t axis, std::size_t level) const {
+    return static_cast<std::int32_t>(axes_[axis].cells << plans_[level].home_depth);
+  }
+
+  /// Whether a box face bounds the cell of a member at home at a coordinate, towards `direction`
+  /// (-1 or +1).
   bool isWall(std::size_t axis, std::size_t level, std::int32_t coordinate, int direction) const {
-    if (direction < 0) return axes_[axis].lower_wall && coordinate == 0;
-    return axes_[axis].upper_wall && coordinate == lattices_[level].end[axis][1];
+    const std::array<std::int32_t, 2>& beside = beside_wall_[level][axis];
+    if (direction < 0) return coordinate <= beside[0];
+    return coordinate >= beside[1];
   }
 
   /// The cell around a place, in cells whose edges are halved `depth` times.
@@ -394,12 +345,6 @@ class CellGrid {
     return c;
   }
 
-  /// The same cell in the coordinates of a lesser depth.
-  static CellCoordinates coarser(const CellCoordinates& c, int depth, int lesser) {
-    const int shift = depth - lesser;
-    return {c[0] >> shift, c[1] >> shift, c[2] >> shift};
-  }
-
   /// Cells once round a periodic axis, of cells whose edges are halved `depth` times; on others so
   /// many that the way round is never the shorter.
   std::int32_t pointsRound(std::size_t axis, int depth) const {
@@ -409,106 +354,208 @@ class CellGrid {
 
   void resize(std::size_t slots) {
     for (CellLevel& level : levels_) level.resize(slots);
+    for (GuestCells& guests : guests_) guests.resize(slots);
   }
 
   /// Takes all balls out.
   void clear() {
     for (CellLevel& level : levels_) level.clear();
+    for (GuestCells& guests : guests_) guests.clear();
   }
 
   /// Puts a ball into its level and, as a guest, into all coarser ones.
-  void link(Slot slot, const CellCoordinates& coordinates, std::size_t level) {
-    levels_[level].link(slot, levels_[level].cellIndex(coordinates));
+  void link(Slot slot, const CellCoordinates& home, std::size_t level) {
+    levels_[level].link(slot, levels_[level].cellIndex(memberCell(home, level)));
+    if (level < finest_) guests_[level].addHost(slot, home);
     for (std::size_t m = 0; m < level; ++m) {
-      levels_[m].linkGuest(slot, levels_[m].cellIndex(inLevel(coordinates, level, m)));
+      guests_[m].link(slot, guests_[m].cellIndex(guestCell(home, level, m)));
     }
   }
 
-  void unlink(Slot slot, const CellCoordinates& coordinates, std::size_t level) {
-    levels_[level].unlink(slot, levels_[level].cellIndex(coordinates));
+  void unlink(Slot slot, const CellCoordinates& home, std::size_t level) {
+    levels_[level].unlink(slot, levels_[level].cellIndex(memberCell(home, level)));
+    if (level < finest_) guests_[level].removeHost(slot, home);
     for (std::size_t m = 0; m < level; ++m) {
-      levels_[m].unlinkGuest(slot, levels_[m].cellIndex(inLevel(coordinates, level, m)));
+      guests_[m].unlink(slot, guests_[m].cellIndex(guestCell(home, level, m)));
     }
   }
 
-  /// Moves a ball to the adjacent cell of its level along `axis`.
+  /// Moves a ball to the adjacent home along `axis` towards `direction` (-1 or +1).
   void move(Slot slot, const CellCoordinates& from, const CellCoordinates& to, std::size_t axis,
-            std::size_t level) {
-    CellLevel& own = levels_[level];
-    const std::uint32_t before = own.cellIndex(from);
-    own.unlink(slot, before);
-    own.link(slot, before - own.neighbours(axis, from[axis]).cell[1] +
-                       own.neighbours(axis, to[axis]).cell[1]);
+            int direction, std::size_t level) {
+    if (level < finest_) {
+      guests_[level].moveHost(slot, from, to, axis, direction);
+      const CellCoordinates before = memberCell(from, level);
+      const CellCoordinates after = memberCell(to, level);
+      if (after != before) moveMember(slot, before, after, axis, level);
+    } else {
+      moveMember(slot, from, to, axis, level);
+    }
     for (std::size_t m = 0; m < level; ++m) {
-      const std::uint32_t was_in = levels_[m].cellIndex(inLevel(from, level, m));
-      const std::uint32_t is_in = levels_[m].cellIndex(inLevel(to, level, m));
-      if (was_in == is_in) continue;
-      levels_[m].unlinkGuest(slot, was_in);
-      levels_[m].linkGuest(slot, is_in);
+      if (!crossesGuestCell(to, axis, direction, level, m)) continue;
+      guests_[m].unlink(slot, guests_[m].cellIndex(guestCell(from, level, m)));
+      guests_[m].link(slot, guests_[m].cellIndex(guestCell(to, level, m)));
     }
   }
 
-  /// Finds all balls that can touch one at these coordinates of `level` before anyone crosses,
+  /// Finds all balls that can touch one that is at home here, on `level`, before anyone crosses,
   /// itself included.
-  void gatherNear(const CellCoordinates& coordinates, std::size_t level,
-                  Candidates& candidates) const {
+  void gatherNear(const CellCoordinates& home, std::size_t level, Candidates& candidates) const {
     candidates.count = 0;
-    const CellLevel& own = levels_[level];
-    own.gather(coordinates, own.hasGuests(), candidates);
-    for (std::size_t m = 0; m < level; ++m) {
-      levels_[m].gather(inLevel(coordinates, level, m), false, candidates);
+    if (level < finest_) {
+      levels_[level].gather(memberCell(home, level), candidates);
+      guests_[level].gather(home, candidates);
+    } else {
+      levels_[level].gather(home, candidates);
     }
+    for (std::size_t m = 0; m < level; ++m) gatherHosts(guestCell(home, level, m), m, candidates);
     candidates.close();
   }
 
-  /// The same, but only the layer of cells that came near when the ball crossed into these
-  /// coordinates along `axis` towards `direction` (-1 or +1), on the levels where cells were
-  /// crossed at all.
-  void gatherNewLayer(const CellCoordinates& after, std::size_t level, std::size_t axis,
-                      int direction, Candidates& candidates) const {
+  /// The same, but only those that came near when the ball crossed into this home along `axis`
+  /// towards `direction` (-1 or +1), perhaps with some that were so before.
+  void gatherNew(const CellCoordinates& home, std::size_t level, std::size_t axis, int direction,
+                 Candidates& candidates) const {
     candidates.count = 0;
-    const CellLevel& own = levels_[level];
-    own.gatherLayer(after, axis, direction, own.hasGuests(), candidates);
+    if (level < finest_) {
+      gatherNewToHost(home, level, axis, direction, candidates);
+    } else {
+      levels_[level].gatherLayer(home, axis, direction, candidates);
+    }
     for (std::size_t m = 0; m < level; ++m) {
-      const int shift = own.depth() - levels_[m].depth();
-      if ((after[axis] - direction) >> shift == after[axis] >> shift) continue;
-      levels_[m].gatherLayer(inLevel(after, level, m), axis, direction, false, candidates);
+      if (!crossesGuestCell(home, axis, direction, level, m)) continue;
+      const CellCoordinates cell = guestCell(home, level, m);
+      if (guests_[m].halvings() > 0) {
+        gatherHosts(cell, m, candidates);
+      } else {
+        levels_[m].gatherLayer(cell, axis, direction, candidates);
+      }
     }
     candidates.close();
   }
 
   /// Finds, of its own level alone, the balls that will be new to one that crosses next.
-  void foreseeNewLayer(const CellCoordinates& before, std::size_t level, std::size_t axis,
-                       int direction, Candidates& candidates) const {
+  void foreseeNew(const CellCoordinates& before, std::size_t level, std::size_t axis, int direction,
+                  Candidates& candidates) const {
     candidates.count = 0;
-    levels_[level].gatherLayer(behind(before, level, axis, direction), axis, direction, false,
-                               candidates);
+    const CellCoordinates home = behind(before, level, axis, direction);
+    if (level < finest_) {
+      gatherNewToHost(home, level, axis, direction, candidates);
+    } else {
+      levels_[level].gatherLayer(home, axis, direction, candidates);
+    }
   }
 
   std::size_t bytes() const {
     std::size_t bytes = 0;
     for (const CellLevel& level : levels_) bytes += level.bytes();
+    for (const GuestCells& guests : guests_) bytes += guests.bytes();
     return bytes;
   }
 
  private:
-  CellCoordinates inLevel(const CellCoordinates& c, std::size_t level, std::size_t coarse) const {
-    return coarser(c, levels_[level].depth(), levels_[coarse].depth());
+  // From end to end of an axis, of cells whose edges are halved `depth` times.
+  std::uint32_t cells(std::size_t axis, int depth) const {
+    return axes_[axis].cells << (axes_[axis].flat ? 0 : depth);
   }
 
-  // The next cell, in the periodic box.
+  GuestCells guestCells(const LevelPlan<Real>& plan) const {
+    const Lattice<Real> homes = lattice(plan.home_depth);
+    std::array<GuestCells::Axis, 3> cut;
+    for (std::size_t k = 0; k < 3; ++k) {
+      cut[k] = {static_cast<std::int32_t>(cells(k, plan.home_depth)), axes_[k].periodic,
+                axes_[k].open(), double(homes.spacing[k])};
+    }
+    return {cut, double((plan.largest + plan.largest_guest) * Real(kCellMargin)),
+            plan.home_depth - plan.depth};
+  }
+
+  // By axis, the last coordinate beside its lower wall and the first beside its upper one. A fourth
+  // axis makes the size a power of two.
+  using BesideWall = std::array<std::array<std::int32_t, 2>, 4>;
+
+  // Homes, and which of them are beside walls.
+  void addLattice(const LevelPlan<Real>& plan) {
+    Lattice<Real> homes = lattice(plan.home_depth);
+    BesideWall beside;
+    constexpr std::int32_t kNowhere = std::numeric_limits<std::int32_t>::max();
+    const std::int32_t within_cell = (1 << (plan.home_depth - plan.depth)) - 1;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto last = static_cast<std::int32_t>(cells(k, plan.home_depth)) - 1;
+      homes.has_ends |= axes_[k].lower_wall || axes_[k].upper_wall;
+      if (axes_[k].lower_wall) homes.end[k][0] = 0;
+      if (axes_[k].upper_wall) homes.end[k][1] = last;
+      beside[k] = {axes_[k].lower_wall ? within_cell : -kNowhere,
+                   axes_[k].upper_wall ? last - within_cell : kNowhere};
+    }
+    lattices_.push_back(homes);
+    beside_wall_[lattices_.size() - 1] = beside;
+  }
+
+  CellCoordinates memberCell(const CellCoordinates& home, std::size_t level) const {
+    return coarserCell(home, plans_[level].home_depth - plans_[level].depth);
+  }
+
+  // The cell of a coarser level's guests.
+  CellCoordinates guestCell(const CellCoordinates& home, std::size_t level,
+                            std::size_t coarse) const {
+    return coarserCell(home, plans_[level].home_depth - plans_[coarse].home_depth);
+  }
+
+  // Whether a ball that has crossed into a home is thereby in another cell of a coarser level's
+  // guests.
+  bool crossesGuestCell(const CellCoordinates& home, std::size_t axis, int direction,
+                        std::size_t level, std::size_t coarse) const {
+    const int halvings = plans_[level].home_depth - plans_[coarse].home_depth;
+    return (home[axis] - direction) >> halvings != home[axis] >> halvings;
+  }
+
+  void moveMember(Slot slot, const CellCoordinates& from, const CellCoordinates& to,
+                  std::size_t axis, std::size_t level) {
+    CellLevel& own = levels_[level];
+    const std::uint32_t before = own.cellIndex(from);
+    own.unlink(slot, before);
+    own.link(slot, before - own.neighbours(axis, from[axis]).cell[1] +
+                       own.neighbours(axis, to[axis]).cell[1]);
+  }
+
+  // The members of a coarser level that a guest of it can touch.
+  void gatherHosts(const CellCoordinates& cell, std::size_t coarse, Candidates& candidates) const {
+    const GuestCells& guests = guests_[coarse];
+    if (guests.halvings() > 0) {
+      const Hosts hosts = guests.hostsAt(guests.cellIndex(cell));
+      if (hosts.none()) return;
+      if (hosts.isSingle()) return candidates.add(hosts.single());
+    }
+    levels_[coarse].gather(coarserCell(cell, guests.halvings()), candidates);
+  }
+
+  void gatherNewToHost(const CellCoordinates& home, std::size_t level, std::size_t axis,
+                       int direction, Candidates& candidates) const {
+    const GuestCells& guests = guests_[level];
+    guests.gatherNew(home, axis, direction, candidates);
+    const int halvings = guests.halvings();
+    if ((home[axis] - direction) >> halvings == home[axis] >> halvings) return;
+    levels_[level].gatherLayer(coarserCell(home, halvings), axis, direction, candidates);
+  }
+
+  // The next home, in the periodic box.
   CellCoordinates behind(CellCoordinates c, std::size_t level, std::size_t axis,
                          int direction) const {
     c[axis] += direction;
     if (!axes_[axis].periodic) return c;
-    const std::int32_t cells = count(axis, level);
-    c[axis] = c[axis] < 0 ? cells - 1 : c[axis] == cells ? 0 : c[axis];
+    const std::int32_t homes = count(axis, level);
+    c[axis] = c[axis] < 0 ? homes - 1 : c[axis] == homes ? 0 : c[axis];
     return c;
   }
 
   std::array<GridAxis<Real>, 3> axes_;
-  std::vector<CellLevel> levels_;        // coarsest first
-  std::vector<Lattice<Real>> lattices_;  // by level
+  std::vector<LevelPlan<Real>> plans_;  // by level, coarsest first, and so below
+  std::size_t finest_ = 0;              // level
+  std::vector<CellLevel> levels_;
+  std::vector<GuestCells> guests_;       // of all levels but the finest
+  std::vector<Lattice<Real>> lattices_;  // of homes
+  std::array<BesideWall, kMostLevels> beside_wall_{};
 };
 
 }  // namespace ball_sim::core

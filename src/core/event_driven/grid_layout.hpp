@@ -2,16 +2,17 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "ball_sim/surroundings.hpp"
 #include "event_driven/cell_grid.hpp"
 
 namespace ball_sim::core {
-
-/// Cells are wider than the balls by this, more than rounding ever moves a ball out of its cell.
-constexpr double kCellMargin = 1 + 1e-9;
 
 /// So many balls fit, with all about them, into a core's own caches.
 constexpr std::size_t kCachedBalls = 4000;
@@ -20,6 +21,12 @@ constexpr std::size_t kCachedBalls = 4000;
 /// but show more balls, and narrower ones take more memory.
 constexpr double kBallsPerCachedCell = 0.35;
 constexpr double kBallsPerCell = 0.5;
+
+/// A level's guests get halved cells where so many share a cell of its members on average. With
+/// fewer, the crossings of more cells cost what the large balls' searches gain. More parts of a
+/// cell than these cost a large ball more than the guests that it is spared.
+constexpr double kGuestsPerCell = 8;
+constexpr double kMostParts = 512;
 
 /// What the layout needs to know of a ball.
 template <class Real>
@@ -66,16 +73,92 @@ Real root(Real number, int degree) {
   return x;
 }
 
-}  // namespace detail
-
 template <class Real>
-Real coarsestEdge(const CellGrid<Real>& grid) {
+Real shortestEdge(const std::array<GridAxis<Real>, 3>& axes) {
   Real shortest = kNever<Real>;
-  for (std::size_t k = 0; k < 3; ++k) {
-    if (!grid.axis(k).flat) shortest = std::min(shortest, grid.edge(k, 0));
+  for (const GridAxis<Real>& axis : axes) {
+    if (!axis.flat) shortest = std::min(shortest, axis.edge);
   }
   return shortest;
 }
+
+// Their number, of cells whose edges are halved `depth` times.
+template <class Real>
+Real numberOfCells(const std::array<GridAxis<Real>, 3>& axes, int depth) {
+  Real cells = 1;
+  for (const GridAxis<Real>& axis : axes) {
+    if (!axis.flat) cells *= Real(axis.cells) * Real(std::uint32_t{1} << depth);
+  }
+  return cells;
+}
+
+// How often the cells for a level's guests and its members' homes are halved: as finely as the next
+// level's, where the guests are many, but not into more cells than pay.
+template <class Real>
+int homeDepth(const std::array<GridAxis<Real>, 3>& axes, int depth, std::size_t guests,
+              int next_depth) {
+  const Real cells = numberOfCells(axes, depth);
+  if (Real(guests) < Real(kGuestsPerCell) * cells) return depth;
+  const Real most = std::min(2 * Real(guests) + 64, Real(kMostParts) * cells);
+  int home_depth = next_depth;
+  while (numberOfCells(axes, home_depth) > most) --home_depth;
+  return home_depth;
+}
+
+// Balls for which cells of one depth are just wide enough.
+template <class Real>
+struct SizeClass {
+  std::size_t balls = 0;
+  Real largest = 0;  // m, radius
+};
+
+template <class Real>
+std::array<SizeClass<Real>, kMostLevels> sizeClasses(Real coarsest_edge,
+                                                     const std::vector<GridBall<Real>>& balls) {
+  std::array<SizeClass<Real>, kMostLevels> classes;
+  for (const GridBall<Real>& ball : balls) {
+    const Real ratio = coarsest_edge / (2 * ball.radius * Real(kCellMargin));
+    std::size_t depth = 0;
+    while (depth < kMostLevels - 1 && ratio >= Real(std::uint32_t{2} << depth)) ++depth;
+    ++classes[depth].balls;
+    classes[depth].largest = std::max(classes[depth].largest, ball.radius);
+  }
+  return classes;
+}
+
+// Levels for balls at most half as wide as those of the level before, where enough of them share
+// the finest cells.
+template <class Real>
+std::vector<LevelPlan<Real>> planLevels(const std::array<GridAxis<Real>, 3>& axes,
+                                        const std::vector<GridBall<Real>>& balls) {
+  const Real coarsest_edge = shortestEdge(axes);
+  const auto classes = sizeClasses(coarsest_edge, balls);
+  std::vector<LevelPlan<Real>> plans;  // finest first
+  LevelPlan<Real> plan;
+  std::size_t members = 0;
+  std::size_t guests = 0;
+  for (int depth = kMostLevels - 1; depth >= 0; --depth) {
+    const SizeClass<Real>& size = classes[static_cast<std::size_t>(depth)];
+    members += size.balls;
+    plan.largest = std::max(plan.largest, size.largest);
+    const bool enough = members > 0 && numberOfCells(axes, depth) <= 4 * Real(members) + 64;
+    if (depth > 0 && !enough) continue;
+    plan.depth = depth;
+    plan.home_depth = homeDepth(axes, depth, guests, plans.empty() ? depth : plans.back().depth);
+    plans.push_back(plan);
+    plan = {};
+    plan.largest_guest = plans.back().largest;
+    guests += std::exchange(members, 0);
+  }
+  // Where there is but one level it takes all that its cells take.
+  if (plans.size() == 1) {
+    plans[0].largest = std::max(plans[0].largest, coarsest_edge / (2 * Real(kCellMargin)));
+  }
+  std::reverse(plans.begin(), plans.end());
+  return plans;
+}
+
+}  // namespace detail
 
 /// Whether neighbour lists pay: they do in dense fluids of balls of about one size, where a ball
 /// meets the same few others again and again. Measured in doc/performance.md.
@@ -169,35 +252,8 @@ CellGrid<Real> layOutGrid(const Surroundings& surroundings,
     if (axis.upper_wall) axis.origin = low[k] + length[k] - Real(axis.cells) * edge;
   }
 
-  if (room > 0) return CellGrid<Real>(axes, {0});
-
-  // Finer levels, for balls at most half as wide, where enough of them share the finest cells.
-  Real shortest = kNever<Real>;
-  for (const GridAxis<Real>& axis : axes) {
-    if (!axis.flat) shortest = std::min(shortest, axis.edge);
-  }
-  std::vector<int> depths = {0};
-  std::vector<std::size_t> at_depth(32, 0);
-  for (const GridBall<Real>& ball : balls) {
-    const Real ratio = shortest / (2 * ball.radius * Real(kCellMargin));
-    int depth = 0;
-    while (depth < 31 && ratio >= Real(std::uint32_t{2} << depth)) ++depth;
-    ++at_depth[static_cast<std::size_t>(depth)];
-  }
-  std::size_t finer = 0;
-  for (int depth = 31; depth > 0; --depth) {
-    finer += at_depth[static_cast<std::size_t>(depth)];
-    Real cells = 1;
-    for (const GridAxis<Real>& axis : axes) {
-      if (!axis.flat) cells *= Real(axis.cells) * Real(std::uint32_t{1} << depth);
-    }
-    if (finer > 0 && cells <= 4 * Real(finer) + 64) {
-      depths.push_back(depth);
-      finer = 0;
-    }
-  }
-  std::sort(depths.begin(), depths.end());
-  return CellGrid<Real>(axes, depths);
+  if (room > 0) return CellGrid<Real>(axes, {LevelPlan<Real>{}});
+  return CellGrid<Real>(axes, detail::planLevels(axes, balls));
 }
 
 }  // namespace ball_sim::core

@@ -41,9 +41,9 @@ class Neighbourhood {
     }
     if (!listed_) {
       grid_ = layOutGrid<Real>(surroundings, balls, 0);
+      largest_ = grid_.largestRadius(0);
       lists_ = {};
     }
-    coarsest_edge_ = coarsestEdge(grid_);
     grid_.resize(balls.size());
     if (listed_) lists_.reset(balls.size(), regions_);
   }
@@ -55,9 +55,7 @@ class Neighbourhood {
   bool nearestSuffices() const { return nearestImagesSuffice(grid_); }
 
   /// Whether a ball of this radius, m, is not too large for the cells.
-  bool fits(Real radius) const {
-    return 2 * radius * Real(kCellMargin) <= (listed_ ? list_reach_ : coarsest_edge_);
-  }
+  bool fits(Real radius) const { return radius <= largest_; }
 
   void resize(std::size_t slots) {
     grid_.resize(slots);
@@ -66,19 +64,18 @@ class Neighbourhood {
 
   /// Where along a space-filling curve a place, m, is.
   std::uint64_t alongCurve(const Vec& x) const {
-    return mortonKey(grid_.coordinatesOf(x, grid_.levels().back().depth()));
+    return mortonKey(grid_.coordinatesOf(x, grid_.homeDepth(grid_.finestLevel())));
   }
 
   /// Puts a ball into its cell.
   /// @param x  m, in the box
   void place(Slot slot, const Vec& x, Real radius, Agenda<Real>& agenda) {
     agenda.level = levelOf(radius);
-    const int depth = grid_.levels()[agenda.level].depth();
+    const int depth = grid_.homeDepth(agenda.level);
     if (listed_) {
-      const int fine = depth + NeighbourLists::kLatticeDepth;
-      const CellCoordinates home = grid_.coordinatesOf(x, fine);
+      const CellCoordinates home = grid_.coordinatesOf(x, depth + NeighbourLists::kLatticeDepth);
       lists_.setHome(slot, home);
-      agenda.cell = CellGrid<Real>::coarser(home, fine, depth);
+      agenda.cell = coarserCell(home, NeighbourLists::kLatticeDepth);
     } else {
       agenda.cell = grid_.coordinatesOf(x, depth);
     }
@@ -144,14 +141,14 @@ class Neighbourhood {
       throw std::range_error("ball " + std::to_string(agenda.id) + " has flown 2^30 cells away");
     }
     agenda.cell[axis] = coordinate;
-    grid_.move(slot, before, agenda.cell, axis, agenda.level);
+    grid_.move(slot, before, agenda.cell, axis, agenda.crossing_direction, agenda.level);
     return turns;
   }
 
   /// The balls that have come near by a crossing, the ball's last.
   Near newcomers(const Agenda<Real>& agenda) {
-    grid_.gatherNewLayer(agenda.cell, agenda.level, agenda.crossing_axis, agenda.crossing_direction,
-                         candidates_);
+    grid_.gatherNew(agenda.cell, agenda.level, agenda.crossing_axis, agenda.crossing_direction,
+                    candidates_);
     return found();
   }
 
@@ -182,8 +179,8 @@ class Neighbourhood {
   }
   /// Who will have come near by a crossing to come, on the ball's level alone.
   Near foreseeNewcomers(const Agenda<Real>& agenda) {
-    grid_.foreseeNewLayer(agenda.cell, agenda.level, agenda.crossing_axis,
-                          agenda.crossing_direction, candidates_);
+    grid_.foreseeNew(agenda.cell, agenda.level, agenda.crossing_axis, agenda.crossing_direction,
+                     candidates_);
     return found();
   }
 
@@ -194,13 +191,12 @@ class Neighbourhood {
 
   // Cells wide enough for lists, and the regions around homes.
   void cutIntoRegions(const Surroundings& surroundings, const std::vector<GridBall<Real>>& balls) {
-    Real largest = 0;
-    for (const GridBall<Real>& ball : balls) largest = std::max(largest, ball.radius);
-    const Real half = Real(NeighbourLists::kHalfRegion) * largest;
-    list_reach_ = 2 * largest * Real(kCellMargin);
+    largest_ = 0;
+    for (const GridBall<Real>& ball : balls) largest_ = std::max(largest_, ball.radius);
+    const Real half = Real(NeighbourLists::kHalfRegion) * largest_;
     grid_ = layOutGrid<Real>(surroundings, balls, 2 * half);
     homes_ = grid_.lattice(NeighbourLists::kLatticeDepth);
-    regions_.reach = static_cast<float>(list_reach_);
+    regions_.reach = static_cast<float>(2 * largest_ * Real(kCellMargin));
     for (std::size_t k = 0; k < 3; ++k) {
       regions_.width[k] = static_cast<std::int32_t>(2 * half / homes_.spacing[k]);
       regions_.round[k] = grid_.pointsRound(k, NeighbourLists::kLatticeDepth);
@@ -210,12 +206,8 @@ class Neighbourhood {
   }
 
   std::uint8_t levelOf(Real radius) const {
-    std::size_t level = grid_.levels().size() - 1;
-    using std::ldexp;
-    while (level > 0 &&
-           ldexp(coarsest_edge_, -grid_.levels()[level].depth()) < 2 * radius * Real(kCellMargin)) {
-      --level;
-    }
+    std::size_t level = grid_.finestLevel();
+    while (level > 0 && radius > grid_.largestRadius(level)) --level;
     return static_cast<std::uint8_t>(level);
   }
 
@@ -229,11 +221,10 @@ class Neighbourhood {
   CellGrid<Real> grid_;
   NeighbourLists lists_;
   bool listed_ = false;
-  Lattice<Real> homes_;     // of the lists, with the regions around them
-  Regions regions_;         // the same, as the lists see them
-  Real list_reach_ = 0;     // m, largest sum of radii that the lists allow for
-  Real coarsest_edge_ = 0;  // m, the shortest edge of a cell of the coarsest level
-  Candidates candidates_;   // scratch: the balls found last
+  Lattice<Real> homes_;    // of the lists, with the regions around them
+  Regions regions_;        // the same, as the lists see them
+  Real largest_ = 0;       // m, radius of the largest balls that the cells or lists allow for
+  Candidates candidates_;  // scratch: the balls found last
 };
 
 }  // namespace ball_sim::core
