@@ -105,6 +105,28 @@ TEST(EventDrivenMemory, NothingIsAllocatedWhenManyDenseBallsAreSorted) {
   expectNoAllocationInSorting(fluid(0.35, kManyBalls), 6.5);
 }
 
+// A ball that is too large for the cells makes space be cut anew before the slot of the one that is
+// gone is used again.
+TEST(EventDrivenMemory, NothingIsLeftOfABallThatRestedAndIsGone) {
+  Trial run("event_driven", {floorUnderGravity(1, 0.5), {}});
+  Method& method = run.method();
+  run.log().capacity = 0;
+  Ball ball;
+  ball.mass = 1;
+  ball.radius = 0.5;
+  std::size_t bytes = 0;
+  for (BallId id = 0; id < 200; ++id) {
+    ball.radius *= 1.01;
+    ball.position.z() = ball.radius;
+    method.insert(id, ball);
+    if (id > 0) method.remove(id - 1);
+    run.advanceTo(id + 1);
+    EXPECT_EQ(method.ball(id).position.z(), ball.radius) << "it rests";
+    if (id == 10) bytes = method.statistics().bytes;
+  }
+  EXPECT_EQ(method.statistics().bytes, bytes);
+}
+
 TEST(EventDrivenMemory, ABallTakesAQuarterOfAKilobyte) {
   for (const double packing_fraction : {0.05, 0.2, 0.49}) {
     Trial run("event_driven", fluid(packing_fraction));

@@ -88,6 +88,7 @@ class EventDriven final : public Method {
       lift(slot);
       neighbourhood_.forget(slot);
     }
+    if constexpr (kGravity) flights_.contacts.release(slot, flights_.isFixed(slot));
     ++agenda(slot).version;
     slots_.erase(found);
     agenda(slot).next = std::exchange(free_slot_, slot);
