@@ -21,9 +21,14 @@ TestScene fluid(double packing_fraction, std::size_t balls = kBalls) {
   return placed(periodicScene(fillOf(balls, {0.5, 0.5}, packing_fraction)));
 }
 
+/// Balls whose sizes differ tenfold, on several levels of cells.
+TestScene mixture(std::size_t balls) {
+  return placed(periodicScene(fillOf(balls, {0.1, 1}, 0.05)));
+}
+
 /// Balls that fall and bounce in a closed box.
-TestScene falling() {
-  TestScene scene = fluid(0.05);
+TestScene falling(std::size_t balls = kBalls) {
+  TestScene scene = fluid(0.05, balls);
   Surroundings& around = scene.surroundings;
   around.periodic = false;
   around.box.min -= Vector3::Constant(0.5);  // no ball reaches out of it
@@ -103,6 +108,14 @@ TEST(EventDrivenMemory, NothingIsAllocatedWhenManyDiluteBallsAreSorted) {
 
 TEST(EventDrivenMemory, NothingIsAllocatedWhenManyDenseBallsAreSorted) {
   expectNoAllocationInSorting(fluid(0.35, kManyBalls), 6.5);
+}
+
+TEST(EventDrivenMemory, NothingIsAllocatedWhenManyUnequalBallsAreSorted) {
+  expectNoAllocationInSorting(mixture(kManyBalls), 22);
+}
+
+TEST(EventDrivenMemory, NothingIsAllocatedWhenManyFallingBallsAreSorted) {
+  expectNoAllocationInSorting(falling(kManyBalls), 22);
 }
 
 // A ball that is too large for the cells makes space be cut anew before the slot of the one that is
