@@ -1,6 +1,7 @@
 // Method event_driven: no allocation once running, and how much memory a ball takes.
 #include <gtest/gtest.h>
 
+#include "event_driven/grid_layout.hpp"
 #include "support/allocation_counter.hpp"
 #include "support/fills.hpp"
 #include "support/trial.hpp"
@@ -12,14 +13,22 @@ namespace {
 // More than a power of two: what doubling has left over must be given back.
 constexpr std::size_t kBalls = 1100;
 
+/// So many that they are sorted in memory as they mix.
+constexpr std::size_t kManyBalls = kCachedBalls + 100;
+
 /// Equal balls in a periodic box.
-TestScene fluid(double packing_fraction) {
-  return placed(periodicScene(fillOf(kBalls, {0.5, 0.5}, packing_fraction)));
+TestScene fluid(double packing_fraction, std::size_t balls = kBalls) {
+  return placed(periodicScene(fillOf(balls, {0.5, 0.5}, packing_fraction)));
+}
+
+/// Balls whose sizes differ tenfold, on several levels of cells.
+TestScene mixture(std::size_t balls) {
+  return placed(periodicScene(fillOf(balls, {0.1, 1}, 0.05)));
 }
 
 /// Balls that fall and bounce in a closed box.
-TestScene falling() {
-  TestScene scene = fluid(0.05);
+TestScene falling(std::size_t balls = kBalls) {
+  TestScene scene = fluid(0.05, balls);
   Surroundings& around = scene.surroundings;
   around.periodic = false;
   around.box.min -= Vector3::Constant(0.5);  // no ball reaches out of it
@@ -53,6 +62,82 @@ TEST(EventDrivenMemory, NothingIsAllocatedOnceDenseBallsFly) {
 
 TEST(EventDrivenMemory, NothingIsAllocatedOnceBallsFall) {
   expectNoAllocation(falling(), 100, 150);
+}
+
+/// Makes all balls faster, so that the calendar has to be tuned.
+void speedUp(Method& method, const BallStates& states, double factor) {
+  for (const BallId id : states.ids) {
+    method.setVelocity(id, factor * method.ball(id).velocity);
+  }
+}
+
+/// Takes some balls out, and puts the same in again under new names.
+void rename(Method& method, BallStates& states, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const Ball ball = method.ball(states.ids[i]);
+    method.remove(states.ids[i]);
+    method.insert(states.ids.back() + 1 + static_cast<BallId>(i), ball);
+  }
+  method.read(states);
+}
+
+/// @param sorting  s, about what it takes for balls to be sorted again at their first speeds
+void expectNoAllocationInSorting(const TestScene& scene, double sorting) {
+  constexpr std::size_t kRenamed = 100;
+  Trial run("event_driven", scene);
+  Method& method = run.method();
+  run.log().capacity = 0;
+  double end = 1.5 * sorting;
+  run.advanceTo(end);
+  BallStates states = run.states();
+  const std::size_t bytes = method.statistics().bytes;
+  const long allocated = allocations;
+  for (const double factor : {4.0, 0.25}) {
+    speedUp(method, states, factor);
+    rename(method, states, kRenamed);
+    run.advanceTo(end += 1.5 * (factor > 1 ? sorting / factor : sorting));
+  }
+  EXPECT_EQ(allocations - allocated, 0);
+  EXPECT_EQ(method.statistics().bytes, bytes);
+  EXPECT_LE(double(bytes) / double(scene.balls.size()), 250);
+}
+
+TEST(EventDrivenMemory, NothingIsAllocatedWhenManyDiluteBallsAreSorted) {
+  expectNoAllocationInSorting(fluid(0.05, kManyBalls), 22);
+}
+
+TEST(EventDrivenMemory, NothingIsAllocatedWhenManyDenseBallsAreSorted) {
+  expectNoAllocationInSorting(fluid(0.35, kManyBalls), 6.5);
+}
+
+TEST(EventDrivenMemory, NothingIsAllocatedWhenManyUnequalBallsAreSorted) {
+  expectNoAllocationInSorting(mixture(kManyBalls), 22);
+}
+
+TEST(EventDrivenMemory, NothingIsAllocatedWhenManyFallingBallsAreSorted) {
+  expectNoAllocationInSorting(falling(kManyBalls), 22);
+}
+
+// A ball that is too large for the cells makes space be cut anew before the slot of the one that is
+// gone is used again.
+TEST(EventDrivenMemory, NothingIsLeftOfABallThatRestedAndIsGone) {
+  Trial run("event_driven", {floorUnderGravity(1, 0.5), {}});
+  Method& method = run.method();
+  run.log().capacity = 0;
+  Ball ball;
+  ball.mass = 1;
+  ball.radius = 0.5;
+  std::size_t bytes = 0;
+  for (BallId id = 0; id < 200; ++id) {
+    ball.radius *= 1.01;
+    ball.position.z() = ball.radius;
+    method.insert(id, ball);
+    if (id > 0) method.remove(id - 1);
+    run.advanceTo(id + 1);
+    EXPECT_EQ(method.ball(id).position.z(), ball.radius) << "it rests";
+    if (id == 10) bytes = method.statistics().bytes;
+  }
+  EXPECT_EQ(method.statistics().bytes, bytes);
 }
 
 TEST(EventDrivenMemory, ABallTakesAQuarterOfAKilobyte) {

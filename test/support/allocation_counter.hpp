@@ -1,8 +1,8 @@
-// Counts what a test program allocates by new, so that a test can tell that nothing is.
+// Counts what a test program allocates by new, and by aligned_alloc as the vectors aligned for huge
+// pages do (huge_page_vector.hpp), so that a test can tell that nothing is.
 //
 // Replaces the global operators of the whole program: include it in one source file only. The
-// vectors aligned for huge pages (huge_page_vector.hpp) call aligned_alloc and are not counted:
-// Statistics::bytes watches them.
+// linker puts the counter before aligned_alloc (test/CMakeLists.txt).
 #pragma once
 
 #include <atomic>
@@ -13,7 +13,7 @@
 namespace ball_sim::core {
 namespace test {
 
-/// Calls of new since the program began, on all threads.
+/// Calls of new and aligned_alloc since the program began, on all threads.
 inline std::atomic<long> allocations{0};
 
 namespace detail {
@@ -24,7 +24,6 @@ inline void* allocate(std::size_t size) noexcept {
 }
 
 inline void* allocate(std::size_t size, std::align_val_t alignment) noexcept {
-  ++allocations;
   const auto step = static_cast<std::size_t>(alignment);
   return std::aligned_alloc(step, (size + step - 1) / step * step);
 }
@@ -37,6 +36,18 @@ inline void* orThrow(void* memory) {
 }  // namespace detail
 }  // namespace test
 }  // namespace ball_sim::core
+
+// The names that the linker gives to a wrapper, and to what it wraps.
+// NOLINTBEGIN(bugprone-reserved-identifier,readability-identifier-naming)
+extern "C" {
+void* __real_aligned_alloc(std::size_t alignment, std::size_t size);
+void* __wrap_aligned_alloc(std::size_t alignment, std::size_t size);
+void* __wrap_aligned_alloc(std::size_t alignment, std::size_t size) {
+  ++ball_sim::core::test::allocations;
+  return __real_aligned_alloc(alignment, size);
+}
+}
+// NOLINTEND(bugprone-reserved-identifier,readability-identifier-naming)
 
 // GCC takes free() in these for a mistake where it has inlined one of the pair but not the other.
 #if defined(__GNUC__) && __GNUC__ >= 11 && !defined(__clang__)

@@ -10,6 +10,7 @@
 //   impact_search.hpp     a ball's next impact
 //   way_out.hpp           when it leaves its cell, or the region around its home
 //   event_queue.hpp       whose event comes first
+//   memory_order.hpp      where in memory a ball is best kept
 //   touching_cluster.hpp  who touches whom, where impacts of one instant are taken together
 //
 // Gets right: everything hard and elastic or dissipative, any masses and radii, walls, gravity,
@@ -36,6 +37,7 @@
 #include "event_driven/event_queue.hpp"
 #include "event_driven/flights.hpp"
 #include "event_driven/impact_search.hpp"
+#include "event_driven/memory_order.hpp"
 #include "event_driven/neighbourhood.hpp"
 #include "event_driven/periodic_space.hpp"
 #include "event_driven/touching_cluster.hpp"
@@ -86,9 +88,10 @@ class EventDriven final : public Method {
       lift(slot);
       neighbourhood_.forget(slot);
     }
+    if constexpr (kGravity) flights_.contacts.release(slot, flights_.isFixed(slot));
     ++agenda(slot).version;
     slots_.erase(found);
-    free_slots_.push_back(slot);
+    agenda(slot).next = std::exchange(free_slot_, slot);
   }
 
   void setMotion(BallId id, const Vector3& position, const Vector3& velocity) override {
@@ -170,8 +173,8 @@ class EventDriven final : public Method {
   Statistics statistics() const override {
     Statistics statistics = statistics_;
     statistics.queue_depth = slots_.size();
-    statistics.bytes =
-        flights_.bytes() + neighbourhood_.bytes() + queue_.bytes() + capacityBytes(slots_);
+    statistics.bytes = flights_.bytes() + neighbourhood_.bytes() + queue_.bytes() +
+                       memory_order_.bytes() + capacityBytes(slots_);
     return statistics;
   }
 
@@ -194,10 +197,8 @@ class EventDriven final : public Method {
   }
 
   Slot takeSlot() {
-    if (!free_slots_.empty()) {
-      const Slot slot = free_slots_.back();
-      free_slots_.pop_back();
-      return slot;
+    if (free_slot_ != kNoSlot) {
+      return std::exchange(free_slot_, agenda(free_slot_).next);
     }
     const std::size_t count = flights_.size() + 1;
     flights_.resize(count);
@@ -268,19 +269,12 @@ class EventDriven final : public Method {
 
   // Cuts space, and finds every ball's next event, for the balls as they are now.
   void layOut() {
-    std::vector<GridBall<Real>> balls;
-    balls.reserve(slots_.size());
-    for (const Slot slot : slots_) {
-      bringHome(slot);
-      balls.push_back({flights_.position(slot), body(slot).radius});
-    }
-    neighbourhood_.layOut(surroundings_, balls);
-    const bool nearest = neighbourhood_.nearestSuffices();
-    space_.setNearestSuffices(nearest);
-    impacts_.choose(surroundings_.periodic && nearest,
-                    neighbourhood_.listed() ? kSearchStep : kLanesForFew);
+    for (const Slot slot : slots_) bringHome(slot);
+    // Before memory is given back: what is taken from that again is not in huge pages.
+    cutSpace();
     sortAlongCurve();
     flights_.shrink();
+    slots_.shrink_to_fit();
     for (const Slot slot : slots_) place(slot);
     for (const Slot slot : slots_) neighbourhood_.fillList(slot, agenda(slot));
     balls_at_layout_ = slots_.size();
@@ -290,36 +284,54 @@ class EventDriven final : public Method {
     setCalendar(estimatedEventRate());
   }
 
-  // Gives the balls new slots along a space-filling curve, so that neighbours in space are
-  // neighbours in memory. What was found stays found.
-  // @return the new slots, by those that were
-  std::vector<Slot> sortAlongCurve() {
-    std::vector<std::pair<std::uint64_t, Slot>> along;
-    along.reserve(slots_.size());
-    for (const Slot slot : slots_) {
-      along.emplace_back(neighbourhood_.alongCurve(flights_.position(slot)), slot);
+  void cutSpace() {
+    std::vector<GridBall<Real>> balls;
+    balls.reserve(slots_.size());
+    for (const Slot slot : slots_) balls.push_back({flights_.position(slot), body(slot).radius});
+    neighbourhood_.layOut(surroundings_, balls);
+    const bool nearest = neighbourhood_.nearestSuffices();
+    space_.setNearestSuffices(nearest);
+    impacts_.choose(surroundings_.periodic && nearest,
+                    neighbourhood_.listed() ? kSearchStep : kLanesForFew);
+  }
+
+  // Gives the balls new slots along a space-filling curve, and none to those that are gone. What
+  // was found stays found; the queue has to be filled anew.
+  //
+  // Nothing is allocated: meanwhile slots_ is the permutation, and balls have their places in it
+  // in their agendas, where the queue had its links.
+  void sortAlongCurve() {
+    const std::size_t balls = slots_.size();
+    for (; free_slot_ != kNoSlot; free_slot_ = agenda(free_slot_).next) {
+      agenda(free_slot_).previous = kNotQueued;
     }
-    std::sort(along.begin(), along.end());
-    std::vector<Slot> to(flights_.size());
-    Slot next = 0;
-    for (const auto& place : along) to[place.second] = next++;
-    for (const Slot slot : free_slots_) to[slot] = next++;
-    free_slots_.clear();
-    for (Slot& slot : slots_) {
+    for (std::size_t i = 0; i < balls; ++i) agenda(slots_[i]).previous = static_cast<Slot>(i);
+    slots_.resize(flights_.size());
+    memory_order_.number([this](Slot slot) { return flights_.position(slot); },
+                         [this](Slot slot) { return isGone(slot); }, slots_);
+    renamePartners(slots_);
+    flights_.moveTo(slots_);
+    flights_.resize(balls);
+    if (ready_) neighbourhood_.renumber(slots_, flights_.agendas);
+    slots_.resize(balls);
+    for (Slot slot = 0; slot < balls; ++slot) slots_[agenda(slot).previous] = slot;
+  }
+
+  // While balls are sorted.
+  bool isGone(Slot slot) const { return agenda(slot).previous == kNotQueued; }
+
+  // @param to  the new slots, by those that were
+  void renamePartners(const std::vector<Slot>& to) {
+    for (Slot slot = 0; slot < flights_.size(); ++slot) {
       Agenda<Real>& own = agenda(slot);
-      if (own.partner < kWall) {
-        if (agenda(own.partner).version == own.partner_version) {
-          own.partner = to[own.partner];
-        } else {  // stale, and so that it will be found to be so
-          own.partner = to[slot];
-          own.partner_version = own.version - 1;
-        }
+      if (isGone(slot) || own.partner >= kWall) continue;
+      if (agenda(own.partner).version == own.partner_version) {
+        own.partner = to[own.partner];
+      } else {  // stale, and so that it will be found to be so
+        own.partner = to[slot];
+        own.partner_version = own.version - 1;
       }
     }
-    for (Slot& slot : slots_) slot = to[slot];
-    flights_.moveTo(to);
-    flights_.resize(slots_.size());
-    return to;
   }
 
   // Events per second, from the times at which half of the balls have their next one. What happens
@@ -380,7 +392,7 @@ class EventDriven final : public Method {
     // Balls that have mixed lie at random in memory again, which matters beyond the caches.
     if (slots_.size() > kCachedBalls &&
         crossings_ - crossings_when_sorted_ > kCrossingsPerSorting * slots_.size()) {
-      neighbourhood_.renumber(sortAlongCurve(), flights_.agendas);
+      sortAlongCurve();
       crossings_when_sorted_ = crossings_;
       queue_.clear();
       for (Slot slot = 0; slot < flights_.size(); ++slot) queue_.insert(slot);
@@ -683,8 +695,9 @@ class EventDriven final : public Method {
 
   PeriodicSpace<Real> space_;
   Flights<Real, kGravity> flights_;
-  std::vector<Slot> slots_;  // of the balls there are, by ascending id
-  std::vector<Slot> free_slots_;
+  std::vector<Slot> slots_;   // of the balls there are, by ascending id
+  Slot free_slot_ = kNoSlot;  // the one used last; its agenda's `next` tells of another
+  MemoryOrder memory_order_;
   Neighbourhood<Real> neighbourhood_;
   ImpactSearch<Real, kGravity> impacts_;
   EventQueue<Real, GoesFirst> queue_;

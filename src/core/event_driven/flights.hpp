@@ -44,6 +44,7 @@ struct Flights {
   Real now = 0;                                ///< s, in this year
   bool keeps_histories;
   ImpactHistory<Real> no_history;  ///< stands in for them
+  std::vector<bool> moved;         ///< scratch of moveTo()
 
   std::size_t size() const { return bodies.size(); }
 
@@ -56,11 +57,12 @@ struct Flights {
 
   /// Gives the balls other slots. @param to  by slot, a permutation
   void moveTo(const std::vector<Slot>& to) {
-    std::vector<bool> moved;
-    moveToPlaces(bodies, to, moved);
-    moveToPlaces(agendas, to, moved);
-    moveToPlaces(histories, to, moved);
-    moveToPlaces(contacts.numbers(), to, moved);
+    exchangeToPlaces(size(), to, moved, [this](Slot a, Slot b) {
+      std::swap(bodies[a], bodies[b]);
+      std::swap(agendas[a], agendas[b]);
+      if (keeps_histories) std::swap(histories[a], histories[b]);
+      if constexpr (kGravity) std::swap(contacts.numbers()[a], contacts.numbers()[b]);
+    });
   }
 
   /// Gives back the memory that growing has left over.
@@ -124,7 +126,7 @@ struct Flights {
 
   std::size_t bytes() const {
     return capacityBytes(bodies) + capacityBytes(agendas) + capacityBytes(histories) +
-           contacts.bytes();
+           contacts.bytes() + moved.capacity() / 8;
   }
 };
 

@@ -65,16 +65,14 @@ class NeighbourLists {
   /// @param to     by the slots they had, those they have; a permutation
   /// @param slots  so many are in use
   void renumber(const std::vector<Slot>& to, std::size_t slots) {
-    std::vector<bool> moved;
-    moveToPlaces(homes_, to, moved);
-    const HugePageVector<Slot> old = std::move(entries_);
-    entries_.assign(to.size() * stride_ + kSearchStep, 0);
-    for (std::size_t slot = 0; slot < to.size(); ++slot) {
-      const Slot* const from = &old[slot * stride_];
-      Slot* const list = &entries_[to[slot] * stride_];
-      list[0] = from[0];
-      for (std::size_t i = 1; i <= from[0]; ++i) list[i] = to[from[i]];
+    for (Slot slot = 0; slot < to.size(); ++slot) {
+      for (Slot* other = begin(slot); other != end(slot); ++other) *other = to[*other];
+      std::fill(end(slot), begin(slot) + capacity(), Slot{0});  // who stood there may be gone
     }
+    exchangeToPlaces(to.size(), to, moved_, [this](Slot a, Slot b) {
+      std::swap(homes_[a], homes_[b]);
+      std::swap_ranges(&countOf(a), &countOf(a) + stride_, &countOf(b));
+    });
     resize(slots);
   }
 
@@ -116,7 +114,8 @@ class NeighbourLists {
   void prefetchHome(Slot slot) const { __builtin_prefetch(&homes_[slot]); }
 
   std::size_t bytes() const {
-    return entries_.capacity() * sizeof(Slot) + homes_.capacity() * sizeof(Home);
+    return entries_.capacity() * sizeof(Slot) + homes_.capacity() * sizeof(Home) +
+           moved_.capacity() / 8;
   }
 
  private:
@@ -201,7 +200,8 @@ class NeighbourLists {
   Whole round_{};
   Metres spacing_{};
   float squared_reach_ = 0;
-  std::vector<Slot> near_;  // scratch of a new list
+  std::vector<Slot> near_;   // scratch of a new list
+  std::vector<bool> moved_;  // scratch of renumber()
 };
 
 }  // namespace ball_sim::core

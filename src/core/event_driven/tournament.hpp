@@ -125,6 +125,7 @@ class Tournament {
   void makeRoom() {
     if (slots_.size() >= capacity_) return;
     slots_.resize(capacity_);
+    free_places_.reserve(capacity_);
     for (std::size_t level = 0; level <= top_; ++level) {
       levels_[level].times.resize(capacity_ >> (kGroupBits * level), kNever<Real>);
       levels_[level].winners.resize(levels_[level].times.size());
