@@ -19,13 +19,9 @@
 // The result is that of event-driven dynamics, to the last bit independent of frames, grid, threads
 // and of when advanceTo() was called: a ball's place is stored at its own last change and nowhere
 // else, and the time of an impact is computed from what the two balls have stored, at the later of
-// their two times. Frames only decide when it is computed. Of the statistics two depend on it:
-// - the last digits of `virial`, whose terms are added slice by slice. Slices end where the
-// caller's
-//   frames do, but do not depend on threads;
-// - `ambiguous_impacts`: only impacts taken in turn are looked at, planned ones are not. Two that
-//   share a ball are both in turn where they lie in one slice. Where a slice happens to end between
-//   them, one or both may have been planned, and they are not counted.
+// their two times. Frames only decide when it is computed. Of the statistics one depends on it: the
+// last digits of `virial`, whose terms are added slice by slice. Slices end where the caller's
+// frames do, but do not depend on threads.
 //
 // Gets right: everything hard and elastic or dissipative, any masses and radii, walls, gravity, at
 // any speed: no impact is missed, none is seen twice. Misses: contact that lasts. A ball comes to
@@ -244,7 +240,7 @@ class Continuous final : public Method {
       slice_end_ = sliceEnd(until, max_events);
       gather();
       if (isWorthPlanning(max_events)) {
-        plans_.make(slice_, slice_end_, waiting_, pending_);
+        plans_.make(slice_, now_, slice_end_, waiting_, pending_);
       } else {
         for (const Impact<Real>& impact : slice_) waiting_.push(impact);
       }

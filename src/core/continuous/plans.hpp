@@ -2,12 +2,13 @@
 // grid, instead of one after the other in order of time.
 //
 // The impacts of a short slice hardly have to do with each other. Those whose balls have no other
-// one in it are planned: what each leads to is computed without changing anything. A plan holds
-// unless a path that it leads to meets another within the slice, be it one of now or one that is
-// planned too. A plan that does not hold is dropped: its impact waits for its turn, with those that
-// share balls. What happens there may end more plans: they are dropped, too, or come true where
-// they are the earlier ones. At the end of the slice, or where it is interrupted, the plans that
-// are left come true. So plans change no bit: until then they have changed nothing.
+// one in it, nor may have one at the same instant in the next, are planned: what each leads to is
+// computed without changing anything. A plan holds unless a path that it leads to meets another
+// within the slice, be it one of now or one that is planned too. A plan that does not hold is
+// dropped: its impact waits for its turn, with those that share balls. What happens there may end
+// more plans: they are dropped, too, or come true where they are the earlier ones. At the end of
+// the slice, or where it is interrupted, the plans that are left come true. So plans change no bit:
+// until then they have changed nothing.
 //
 // While there are plans, the grid shows both paths of their balls.
 #pragma once
@@ -47,12 +48,15 @@ class Plans {
 
   /// Plans what can be planned of a slice.
   /// @param slice      all its impacts, none stale
-  /// @param slice_end  s, in this era
+  /// @param slice_begin, slice_end  s, in this era
   /// @param waiting    empty; takes those that are not planned
   /// @param later      takes what plans lead to between slice and end of frame
-  void make(const std::vector<Impact<Real>>& slice, Real slice_end, Heap& waiting,
+  void make(const std::vector<Impact<Real>>& slice, Real slice_begin, Real slice_end, Heap& waiting,
             std::vector<Impact<Real>>& later) {
     slice_end_ = slice_end;
+    const Real instant = Real(kInstant) * (frame_.end() - frame_.start());
+    earliest_ = slice_begin + instant;
+    latest_ = slice_end - instant;
     chooseLone(slice, waiting);
     left_ = count_ = lone_.size();
     if (plans_.size() < count_) plans_.resize(count_ + count_ / 4);
@@ -147,6 +151,11 @@ class Plans {
   };
 
   static constexpr std::size_t kFewPlans = 200;  // not worth waking threads for
+  // Of a frame, in which the fastest ball moves by a thirtieth of a radius or more. Impacts so near
+  // to a slice's end are taken in turn, where OrderWatch sees them: one that shares a ball with
+  // them at the same instant may be in the next slice. Wide enough for speeds of approach down to
+  // 1e-5 of the fastest ball's, and one impact in a thousand.
+  static constexpr double kInstant = 0x1p-16;
   // Instead of a plan's index.
   static constexpr std::uint32_t kNoPlan = 0xFFFFFFFF;
   static constexpr std::uint32_t kOneImpact = 0xFFFFFFFE;
@@ -197,7 +206,8 @@ class Plans {
   // Impacts with walls, and of balls that rest on walls, are taken in turn.
   bool isLone(const Impact<Real>& impact) const {
     return impact.b < kWall && !balls_.isResting(impact.a) && !balls_.isResting(impact.b) &&
-           plan_of_[impact.a] == kOneImpact && plan_of_[impact.b] == kOneImpact;
+           plan_of_[impact.a] == kOneImpact && plan_of_[impact.b] == kOneImpact &&
+           impact.time > earliest_ && impact.time < latest_;
   }
 
   // --- planning, by all threads
@@ -314,6 +324,7 @@ class Plans {
   ImpactOrder<Real, kGravity> before_;
 
   Real slice_end_ = 0;              // s, in this era
+  Real earliest_ = 0, latest_ = 0;  // s, in this era: what is planned lies between
   std::vector<Impact<Real>> lone_;  // those planned
   std::vector<Plan> plans_;         // of which the first count_ are of this slice
   std::size_t count_ = 0;
