@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "ball_sim/observables.hpp"
+#include "continuous/exact_sum.hpp"
 #include "support/allocation_counter.hpp"
 #include "support/fills.hpp"
 #include "support/random_scenes.hpp"
@@ -246,6 +247,33 @@ TEST(Continuous, seesImpactsOfOneInstantInTwoSlices) {
   }
 }
 
+TEST(Continuous, sumsExactly) {
+  ExactSum sum;
+  EXPECT_EQ(sum.value(), 0);
+  const double large = 0x1p53;
+  for (const double term : {1.0, large, 1.0, 0.25, 0.75, 0x1p-1074, 1.0}) sum.add(term);
+  EXPECT_EQ(sum.value(), large + 4);  // one by one it would be `large`, where 1 is half an ulp
+  ExactSum same;
+  for (const double term : {0x1p-1074, 0.25, 1.0, 1.0, 1.0, large, 0.75}) same.add(term);
+  EXPECT_EQ(same.value(), sum.value());
+  ExactSum small;
+  for (int i = 0; i < 3; ++i) small.add(0x1p-1074);
+  EXPECT_EQ(small.value(), 3 * 0x1p-1074);
+  ExactSum huge;
+  for (int i = 0; i < 4; ++i) huge.add(0x1.8p1020);
+  EXPECT_EQ(huge.value(), 0x1.8p1022);
+  // Whole multiples of 2^-20 below 2^53 of them: integers are the oracle.
+  RandomNumbers random(13);
+  ExactSum many;
+  std::uint64_t expected = 0;
+  for (int i = 0; i < 10000; ++i) {
+    const auto whole = static_cast<std::uint64_t>(random.uniform(0, 1e11));
+    expected += whole;
+    many.add(std::ldexp(static_cast<double>(whole), -20));
+  }
+  EXPECT_EQ(many.value(), std::ldexp(static_cast<double>(expected), -20));
+}
+
 // Of every kind of scene: steps of any length, and stops at any number of impacts.
 TEST(Continuous, sameBitsForAnyFrames) {
   for (const SceneKind& kind : sceneKinds()) {
@@ -264,6 +292,7 @@ TEST(Continuous, sameBitsForAnyFrames) {
         }
       }
       EXPECT_EQ(hashOf(stepped), hashOf(whole)) << frame;
+      EXPECT_EQ(stepped.method().statistics().virial, whole.method().statistics().virial) << frame;
       expectSameCollisions(stepped, whole);
       if (HasFailure()) return;
     }

@@ -15,13 +15,12 @@
 //   impacts.hpp           which comes first, and what it leads to
 //   plans.hpp             impacts computed side by side
 //   collision_report.hpp  the log, in order of time
+//   exact_sum.hpp         the virial, whatever the order
 //
 // The result is that of event-driven dynamics, to the last bit independent of frames, grid, threads
 // and of when advanceTo() was called: a ball's place is stored at its own last change and nowhere
 // else, and the time of an impact is computed from what the two balls have stored, at the later of
-// their two times. Frames only decide when it is computed. Of the statistics one depends on it: the
-// last digits of `virial`, whose terms are added slice by slice. Slices end where the caller's
-// frames do, but do not depend on threads.
+// their two times. Frames only decide when it is computed.
 //
 // Gets right: everything hard and elastic or dissipative, any masses and radii, walls, gravity, at
 // any speed: no impact is missed, none is seen twice. Misses: contact that lasts. A ball comes to
@@ -45,6 +44,7 @@
 #include "continuous/balls.hpp"
 #include "continuous/collision_report.hpp"
 #include "continuous/era_length.hpp"
+#include "continuous/exact_sum.hpp"
 #include "continuous/frame.hpp"
 #include "continuous/impact_search.hpp"
 #include "continuous/impacts.hpp"
@@ -164,6 +164,7 @@ class Continuous final : public Method {
 
   Statistics statistics() const override {
     Statistics statistics = statistics_;
+    statistics.virial = virial_.value();
     statistics.queue_depth = pending_.size();
     statistics.bytes = balls_.bytes() + frame_.bytes() + search_.bytes() + plans_.bytes() +
                        report_.bytes() + capacityBytes(pending_) + capacityBytes(slice_) +
@@ -424,7 +425,7 @@ class Continuous final : public Method {
   void count(const Outcome<Real>& outcome) {
     if (!outcome.happens()) return;
     ++statistics_.ball_collisions;
-    statistics_.virial += double(outcome.passed.exchange.impulse * outcome.reach());
+    virial_.add(double(outcome.passed.exchange.impulse * outcome.reach()));
     noteOverlap(outcome.passed.overlap);
   }
 
@@ -478,6 +479,7 @@ class Continuous final : public Method {
   Time reached_;  // what now() tells
   OrderWatch<Real> watch_;
   Statistics statistics_;
+  ExactSum virial_;  // J; as slices end anywhere, its terms come in any order
   CollisionLog* log_ = nullptr;
 };
 
