@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "continuous/balls.hpp"
+#include "continuous/buffer.hpp"
 #include "continuous/frame.hpp"
 #include "continuous/impact_search.hpp"
 #include "continuous/impacts.hpp"
@@ -51,15 +52,15 @@ class Plans {
   /// @param slice_begin, slice_end  s, in this era
   /// @param waiting    empty; takes those that are not planned
   /// @param later      takes what plans lead to between slice and end of frame
-  void make(const std::vector<Impact<Real>>& slice, Real slice_begin, Real slice_end, Heap& waiting,
-            std::vector<Impact<Real>>& later) {
+  void make(const Buffer<Impact<Real>>& slice, Real slice_begin, Real slice_end, Heap& waiting,
+            Buffer<Impact<Real>>& later) {
     slice_end_ = slice_end;
     const Real instant = Real(kInstant) * (frame_.end() - frame_.start());
     earliest_ = slice_begin + instant;
     latest_ = slice_end - instant;
     chooseLone(slice, waiting);
     left_ = count_ = lone_.size();
-    if (plans_.size() < count_) plans_.resize(count_ + count_ / 4);
+    if (plans_.size() < count_) plans_.resize(count_);
     first_version_ = balls_.takeVersions(count_);
     share(threads(), count_, [this](std::size_t begin, std::size_t end, unsigned) {
       inBatches(begin, end, [this](std::size_t first, std::size_t last) { draw(first, last); });
@@ -126,6 +127,14 @@ class Plans {
   /// Forgets plans that have been settled.
   void clear() { count_ = left_ = 0; }
 
+  /// For when there are no plans.
+  void giveBackRoom() {
+    plans_.clear();
+    plans_.giveBackRoom();
+    lone_.giveBackRoom();
+    for (Disturbed& disturbed : disturbed_) disturbed.plans.giveBackRoom();
+  }
+
   std::size_t bytes() const {
     std::size_t bytes = capacityBytes(lone_) + capacityBytes(plans_) + capacityBytes(plan_of_);
     for (const Disturbed& disturbed : disturbed_) bytes += capacityBytes(disturbed.plans);
@@ -147,7 +156,7 @@ class Plans {
 
   // Plans that a thread has found not to hold.
   struct alignas(64) Disturbed {
-    std::vector<std::uint32_t> plans;
+    Buffer<std::uint32_t> plans;
   };
 
   static constexpr std::size_t kFewPlans = 200;  // not worth waking threads for
@@ -174,7 +183,7 @@ class Plans {
   // --- choice
 
   // Sorts out the impacts of the slice that share no ball; the others wait for their turn.
-  void chooseLone(const std::vector<Impact<Real>>& slice, Heap& waiting) {
+  void chooseLone(const Buffer<Impact<Real>>& slice, Heap& waiting) {
     plan_of_.resize(balls_.size(), kNoPlan);
     lone_.clear();
     for (const Impact<Real>& impact : slice) {
@@ -242,7 +251,7 @@ class Plans {
 
   // Finds which plans do not hold, and what some plans lead to after the slice.
   void check(std::size_t begin, std::size_t end, Searcher<Real>& searcher,
-             std::vector<std::uint32_t>& disturbed) const {
+             Buffer<std::uint32_t>& disturbed) const {
     const auto note = [&](const Impact<Real>& impact) {
       if (impact.time <= slice_end_) {
         forBalls(impact, [&](Slot slot) {
@@ -325,8 +334,8 @@ class Plans {
 
   Real slice_end_ = 0;              // s, in this era
   Real earliest_ = 0, latest_ = 0;  // s, in this era: what is planned lies between
-  std::vector<Impact<Real>> lone_;  // those planned
-  std::vector<Plan> plans_;         // of which the first count_ are of this slice
+  Buffer<Impact<Real>> lone_;       // those planned
+  Buffer<Plan> plans_;              // of which the first count_ are of this slice
   std::size_t count_ = 0;
   std::size_t left_ = 0;                // of these, not dropped
   std::uint32_t first_version_ = 0;     // of the first plan's balls, once it comes true; then on
