@@ -9,70 +9,67 @@
 namespace ball_sim::core::continuous {
 
 /// A vector that does not double when it grows, and that gives back what it has not used for long.
+/// Values that are taken off, or not set after resize(), keep what they were.
 template <class T>
 class Buffer {
  public:
   using value_type = T;
 
-  auto begin() { return values_.begin(); }
-  auto end() { return values_.end(); }
-  auto begin() const { return values_.begin(); }
-  auto end() const { return values_.end(); }
-  T& operator[](std::size_t i) { return values_[i]; }
-  const T& operator[](std::size_t i) const { return values_[i]; }
-  const T& front() const { return values_.front(); }
-  T& back() { return values_.back(); }
-  bool empty() const { return values_.empty(); }
-  std::size_t size() const { return values_.size(); }
-  std::size_t capacity() const { return values_.capacity(); }
+  T* begin() { return room_.data(); }
+  T* end() { return room_.data() + size_; }
+  const T* begin() const { return room_.data(); }
+  const T* end() const { return room_.data() + size_; }
+  T& operator[](std::size_t i) { return room_[i]; }
+  const T& operator[](std::size_t i) const { return room_[i]; }
+  const T& front() const { return room_.front(); }
+  T& back() { return room_[size_ - 1]; }
+  bool empty() const { return size_ == 0; }
+  std::size_t size() const { return size_; }
+  std::size_t capacity() const { return room_.capacity(); }
 
   void push_back(const T& value) {
-    if (values_.size() == values_.capacity()) makeRoomFor(values_.size() + 1);
-    values_.push_back(value);
+    if (size_ == room_.size()) grow(size_ + 1);
+    room_[size_++] = value;
   }
-  void pop_back() { values_.pop_back(); }
+  void pop_back() { resize(size_ - 1); }
 
   void append(const Buffer& other) {
-    makeRoomFor(values_.size() + other.size());
-    values_.insert(values_.end(), other.begin(), other.end());
+    const std::size_t before = size_;
+    resize(size_ + other.size_);
+    std::copy(other.begin(), other.end(), begin() + before);
   }
 
   void resize(std::size_t size) {
-    most_ = std::max(most_, values_.size());
-    makeRoomFor(size);
-    values_.resize(size);
+    most_ = std::max(most_, size_);
+    if (size > room_.size()) grow(size);
+    size_ = size;
   }
+  void clear() { resize(0); }
 
-  void clear() {
-    most_ = std::max(most_, values_.size());
-    values_.clear();
-  }
-
-  void swap(Buffer& other) {
-    values_.swap(other.values_);
-    std::swap(most_, other.most_);
-  }
+  void swap(Buffer& other) { std::swap(*this, other); }
 
   /// Keeps room for as many as there have been since the last call, and a few more. Where there is
   /// little too much nothing is done: what has settled is allocated no more.
   void giveBackRoom() {
-    const std::size_t most = std::max(most_, values_.size());
+    const std::size_t most = std::max(most_, size_);
     most_ = 0;
-    if (values_.capacity() <= most + most / 2 + kFew) return;
-    std::vector<T> values;
-    values.reserve(most + most / 8);
-    values.assign(values_.begin(), values_.end());
-    values_.swap(values);
+    if (room_.size() > most + most / 2 + kFew) makeRoom(most + most / 8);
   }
 
  private:
   static constexpr std::size_t kFew = 1024 / sizeof(T);
 
-  void makeRoomFor(std::size_t size) {
-    if (size > values_.capacity()) values_.reserve(size + size / 8 + 1);
+  // Rare, so it is kept out of the callers' code.
+  __attribute__((noinline)) void grow(std::size_t size) { makeRoom(size + size / 8 + 1); }
+
+  void makeRoom(std::size_t size) {
+    std::vector<T> room(size);
+    std::copy(begin(), end(), room.begin());
+    room_.swap(room);
   }
 
-  std::vector<T> values_;
+  std::vector<T> room_;
+  std::size_t size_ = 0;  // values, of those that there is room for
   std::size_t most_ = 0;  // values, seen before they became fewer
 };
 

@@ -59,13 +59,13 @@ class Plans {
     earliest_ = slice_begin + instant;
     latest_ = slice_end - instant;
     chooseLone(slice, waiting);
-    left_ = count_ = lone_.size();
-    if (plans_.size() < count_) plans_.resize(count_);
-    first_version_ = balls_.takeVersions(count_);
-    share(threads(), count_, [this](std::size_t begin, std::size_t end, unsigned) {
+    left_ = lone_.size();
+    plans_.resize(left_);
+    first_version_ = balls_.takeVersions(left_);
+    share(threads(), plans_.size(), [this](std::size_t begin, std::size_t end, unsigned) {
       inBatches(begin, end, [this](std::size_t first, std::size_t last) { draw(first, last); });
     });
-    share(threads(), count_, [this](std::size_t begin, std::size_t end, unsigned thread) {
+    share(threads(), plans_.size(), [this](std::size_t begin, std::size_t end, unsigned thread) {
       inBatches(begin, end, [this, thread](std::size_t first, std::size_t last) {
         check(first, last, search_.searcher(thread), disturbed_[thread].plans);
       });
@@ -104,12 +104,12 @@ class Plans {
   /// @param bound  nullptr, or only those before this impact: the others are dropped
   void settle(const Impact<Real>* bound, Heap& waiting) {
     if (bound != nullptr && left_ > 0) {
-      for (std::uint32_t i = 0; i < count_; ++i) {
+      for (std::uint32_t i = 0; i < plans_.size(); ++i) {
         const Plan& plan = plans_[i];
         if (plan.state == State::open && !before_(plan.outcome.impact, *bound)) drop(i, waiting);
       }
     }
-    share(threads(), count_, [this](std::size_t begin, std::size_t end, unsigned) {
+    share(threads(), plans_.size(), [this](std::size_t begin, std::size_t end, unsigned) {
       for (std::size_t i = begin; i < end; ++i) {
         if (plans_[i].state == State::open) comeTrue(plans_[i]);
       }
@@ -119,17 +119,18 @@ class Plans {
   /// Calls f with the outcome of each plan that has come true, in the order of the grid.
   template <class Function>
   void forEachThatCameTrue(const Function& f) const {
-    for (std::size_t i = 0; i < count_; ++i) {
-      if (plans_[i].state == State::came_true) f(plans_[i].outcome);
+    for (const Plan& plan : plans_) {
+      if (plan.state == State::came_true) f(plan.outcome);
     }
   }
 
   /// Forgets plans that have been settled.
-  void clear() { count_ = left_ = 0; }
-
-  /// For when there are no plans.
-  void giveBackRoom() {
+  void clear() {
     plans_.clear();
+    left_ = 0;
+  }
+
+  void giveBackRoom() {
     plans_.giveBackRoom();
     lone_.giveBackRoom();
     for (Disturbed& disturbed : disturbed_) disturbed.plans.giveBackRoom();
@@ -170,7 +171,7 @@ class Plans {
   static constexpr std::uint32_t kOneImpact = 0xFFFFFFFE;
   static constexpr std::uint32_t kManyImpacts = 0xFFFFFFFD;
 
-  WorkerPool& threads() { return pools_.forWork(count_, kFewPlans); }
+  WorkerPool& threads() { return pools_.forWork(plans_.size(), kFewPlans); }
 
   bool isPlanned(Slot slot) const { return plan_of_[slot] != kNoPlan; }
 
@@ -332,11 +333,10 @@ class Plans {
   WorkerPools& pools_;
   ImpactOrder<Real, kGravity> before_;
 
-  Real slice_end_ = 0;              // s, in this era
-  Real earliest_ = 0, latest_ = 0;  // s, in this era: what is planned lies between
-  Buffer<Impact<Real>> lone_;       // those planned
-  Buffer<Plan> plans_;              // of which the first count_ are of this slice
-  std::size_t count_ = 0;
+  Real slice_end_ = 0;                  // s, in this era
+  Real earliest_ = 0, latest_ = 0;      // s, in this era: what is planned lies between
+  Buffer<Impact<Real>> lone_;           // those planned
+  Buffer<Plan> plans_;                  // of this slice
   std::size_t left_ = 0;                // of these, not dropped
   std::uint32_t first_version_ = 0;     // of the first plan's balls, once it comes true; then on
   std::vector<std::uint32_t> plan_of_;  // by slot

@@ -255,18 +255,6 @@ void SweptGrid::findInBox(const Level& level, const SweptBall& ball, double reac
   run(sphere, search);
 }
 
-// The cell that holds a ball. Quick where it is not far behind another one.
-std::uint32_t SweptGrid::cellAt(std::size_t position, std::uint32_t before) const {
-  const std::uint32_t* const begins = this->begins();
-  std::uint32_t cell = before;
-  if (cell >= cells_ || position < begins[cell]) {
-    const std::uint32_t* const after = std::upper_bound(begins, begins + cells_, position);
-    return static_cast<std::uint32_t>(after - begins) - 1;
-  }
-  while (position >= begins[cell + 1]) ++cell;
-  return cell;
-}
-
 void SweptGrid::findAhead(std::size_t position, std::size_t level, SweptSearch& search) const {
   const Level& own = levels_[level];
   search.cell = cellAt(position, search.cell);

@@ -297,7 +297,16 @@ class SweptGrid {
   void countWorkers(unsigned workers);
   void sumUp();
   void setNear(Level& level) const;
-  std::uint32_t cellAt(std::size_t position, std::uint32_t before) const;
+  // The cell that holds a ball. Quick where it is not far behind another one.
+  std::uint32_t cellAt(std::size_t position, std::uint32_t before) const {
+    const std::uint32_t* const begins = this->begins();
+    if (before >= cells_ || position < begins[before]) {
+      const std::uint32_t* const after = std::upper_bound(begins, begins + cells_, position);
+      return static_cast<std::uint32_t>(after - begins) - 1;
+    }
+    while (position >= begins[before + 1]) ++before;
+    return before;
+  }
   void runsAhead(std::uint32_t key, const Level& level, SweptSearch& search) const;
   Range nearOf(const Level& level, std::size_t k, Cell cell) const;
 
