@@ -61,19 +61,21 @@ TEST(Continuous, sameBitsForAnyNumberOfThreads) {
   }
 }
 
+constexpr std::size_t kPlannedBalls = 5000;  // enough for impacts to be planned
+
 /// Gases in which impacts of a slice often have to do with each other, and in which they hold what
 /// a plan has to know: walls, images, falls, histories, sizes.
 std::vector<std::pair<const char*, TestScene>> plannedScenes() {
   std::vector<std::pair<const char*, TestScene>> scenes;
-  scenes.emplace_back("dilute", gas(2000));
-  scenes.emplace_back("dense", gas(1500, 0.05, 0.4));
-  scenes.emplace_back("sizes", gas(1500, 0.2));
-  scenes.emplace_back("periodic", gas(2000, 0.05, 0.2));
+  scenes.emplace_back("dilute", gas(kPlannedBalls));
+  scenes.emplace_back("dense", gas(kPlannedBalls, 0.05, 0.4));
+  scenes.emplace_back("sizes", gas(kPlannedBalls, 0.2));
+  scenes.emplace_back("periodic", gas(kPlannedBalls, 0.05, 0.2));
   scenes.back().second.surroundings.periodic = true;
-  scenes.emplace_back("falling", gas(1500, 0.05, 0.2));
+  scenes.emplace_back("falling", gas(kPlannedBalls, 0.05, 0.2));
   scenes.back().second.surroundings.gravity = Vector3(1, 0, -9);
   scenes.back().second.surroundings.restitution = 0.9;
-  for (std::size_t i = 0; i < 1500; i += 50) {
+  for (std::size_t i = 0; i < kPlannedBalls; i += 50) {
     Ball& ball = scenes.back().second.balls[i];
     ball.velocity = Vector3::Zero();
     ball.mass = kFixed;
@@ -86,7 +88,7 @@ std::vector<std::pair<const char*, TestScene>> plannedScenes() {
 TEST(Continuous, sameBitsWhetherPlannedOrInTurn) {
   for (const auto& [name, scene] : plannedScenes()) {
     SCOPED_TRACE(name);
-    const Time end = Time::fromSeconds(0.1);
+    const Time end = Time::fromSeconds(0.08);
     Trial in_turn(kMethod, scene);
     while (!in_turn.method().advanceTo(end, 1)) {
     }
@@ -110,11 +112,11 @@ TEST(Continuous, sameBitsWhetherPlannedOrInTurn) {
 
 // What is read when plans are interrupted is the state of that instant.
 TEST(Continuous, isWhereItSaysWhenInterrupted) {
-  const TestScene scene = gas(1500, 0.05, 0.3);
+  const TestScene scene = gas(kPlannedBalls, 0.05, 0.3);
   Trial interrupted(kMethod, scene);
   Trial straight(kMethod, scene);
   RandomNumbers random(11);
-  const Time end = Time::fromSeconds(0.05);
+  const Time end = Time::fromSeconds(0.01);
   int stops = 0;
   while (!interrupted.method().advanceTo(end, 20 + random.index(30))) {
     straight.method().advanceTo(interrupted.method().now());
@@ -139,6 +141,7 @@ TEST(Continuous, isAtItsLastPlannedImpactWhenInterrupted) {
   }
   add(0, -10, 1);
   for (const double x : {1.01, 2.02, 3.1}) add(x, -10, 0);  // after 0.01, 0.02 and 0.1 s
+  while (scene.balls.size() < kPlannedBalls) add(1e4, 2.0 * double(scene.balls.size()), 0);
   Trial run(kMethod, scene);
   ASSERT_FALSE(run.method().advanceTo(Time::fromSeconds(0.2), 12));
   ASSERT_EQ(run.collisions().size(), 12u);
@@ -231,7 +234,7 @@ std::uint64_t ambiguousImpacts(const char* method, const TestScene& scene,
 TEST(Continuous, seesImpactsOfOneInstantInTwoSlices) {
   for (const auto& [rows, flowers] : {std::pair{100, 0}, std::pair{0, 100}}) {
     SCOPED_TRACE(rows > 0 ? "rows" : "flowers");
-    const Clusters clusters(rows, flowers, 1200);
+    const Clusters clusters(rows, flowers, kPlannedBalls / 2);
     const TestScene& scene = clusters.scene();
     const std::vector<double> dates = clusters.dates(kMethod);
     ASSERT_GE(dates.size(), 100u);
@@ -385,7 +388,7 @@ TEST(Continuous, missesNoneOfTheChordsThatStepsMiss) {
 
 TEST(Continuous, allocatesNothingOnceRunning) {
   for (const unsigned threads : {1u, 2u}) {
-    const TestScene scene = gas(3000);
+    const TestScene scene = gas(kPlannedBalls);
     Trial run(kMethod, scene, withThreads(threads));
     run.method().setCollisionLog(nullptr);
     run.advanceTo(3);
@@ -401,14 +404,14 @@ TEST(Continuous, allocatesNothingOnceRunning) {
   }
 }
 
-// Walls take 16 bytes a ball. More than a power of two of balls: what doubling leaves over counts.
+// In a closed box, whose walls take 16 bytes a ball.
 TEST(Continuous, keepsToAQuarterOfAKilobyteABall) {
   for (const auto& [packing_fraction, most] :
-       {std::pair{0.05, 230}, std::pair{0.1, 240}, std::pair{0.2, 250}, std::pair{0.45, 310}}) {
-    Trial run(kMethod, gas(1100, 0.05, packing_fraction));
+       {std::pair{0.05, 220}, std::pair{0.1, 230}, std::pair{0.2, 240}, std::pair{0.45, 300}}) {
+    Trial run(kMethod, gas(kPlannedBalls, 0.05, packing_fraction));
     run.log().capacity = 0;
-    for (double t = 0; t < 1; t += 1.0 / 60) run.advanceTo(t);  // the first frames take more
-    const double bytes = double(run.method().statistics().bytes) / 1100;
+    for (double t = 0; t < 0.6; t += 1.0 / 60) run.advanceTo(t);  // the first frames take more
+    const double bytes = double(run.method().statistics().bytes) / kPlannedBalls;
     EXPECT_LE(bytes, most) << "packing fraction " << packing_fraction;
     EXPECT_GE(bytes, 2 * 64) << "two cache lines are each ball's own";
   }
