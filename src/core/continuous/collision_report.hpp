@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <vector>
 
 #include "ball_sim/method.hpp"
 #include "continuous/balls.hpp"
+#include "continuous/buffer.hpp"
 #include "continuous/impacts.hpp"
 
 namespace ball_sim::core::continuous {
@@ -83,6 +83,11 @@ class CollisionReport {
     planned_.clear();
   }
 
+  void giveBackRoom() {
+    in_turn_.giveBackRoom();
+    planned_.giveBackRoom();
+  }
+
   std::size_t bytes() const { return capacityBytes(in_turn_) + capacityBytes(planned_); }
 
  private:
@@ -93,8 +98,8 @@ class CollisionReport {
 
   const Balls<Real, kGravity>& balls_;
   ImpactOrder<Real, kGravity> before_;
-  std::vector<InTurn> in_turn_;
-  std::vector<const Outcome<Real>*> planned_;
+  Buffer<InTurn> in_turn_;
+  Buffer<const Outcome<Real>*> planned_;
 };
 
 }  // namespace ball_sim::core::continuous

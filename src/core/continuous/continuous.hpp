@@ -14,18 +14,14 @@
 //   impact_search.hpp     the impacts that paths lead to
 //   impacts.hpp           which comes first, and what it leads to
 //   plans.hpp             impacts computed side by side
+//   buffer.hpp            room for what lasts a slice or a frame
 //   collision_report.hpp  the log, in order of time
+//   exact_sum.hpp         the virial, whatever the order
 //
 // The result is that of event-driven dynamics, to the last bit independent of frames, grid, threads
 // and of when advanceTo() was called: a ball's place is stored at its own last change and nowhere
 // else, and the time of an impact is computed from what the two balls have stored, at the later of
-// their two times. Frames only decide when it is computed. Of the statistics two depend on it:
-// - the last digits of `virial`, whose terms are added slice by slice. Slices end where the
-// caller's
-//   frames do, but do not depend on threads;
-// - `ambiguous_impacts`: only impacts taken in turn are looked at, planned ones are not. Two that
-//   share a ball are both in turn where they lie in one slice. Where a slice happens to end between
-//   them, one or both may have been planned, and they are not counted.
+// their two times. Frames only decide when it is computed.
 //
 // Gets right: everything hard and elastic or dissipative, any masses and radii, walls, gravity, at
 // any speed: no impact is missed, none is seen twice. Misses: contact that lasts. A ball comes to
@@ -47,8 +43,10 @@
 #include "ball_sim/simultaneous_impacts.hpp"
 #include "ball_sim/walls.hpp"
 #include "continuous/balls.hpp"
+#include "continuous/buffer.hpp"
 #include "continuous/collision_report.hpp"
 #include "continuous/era_length.hpp"
+#include "continuous/exact_sum.hpp"
 #include "continuous/frame.hpp"
 #include "continuous/impact_search.hpp"
 #include "continuous/impacts.hpp"
@@ -168,6 +166,7 @@ class Continuous final : public Method {
 
   Statistics statistics() const override {
     Statistics statistics = statistics_;
+    statistics.virial = virial_.value();
     statistics.queue_depth = pending_.size();
     statistics.bytes = balls_.bytes() + frame_.bytes() + search_.bytes() + plans_.bytes() +
                        report_.bytes() + capacityBytes(pending_) + capacityBytes(slice_) +
@@ -179,7 +178,10 @@ class Continuous final : public Method {
 
  private:
   static constexpr std::size_t kFewBalls = 2000;  // not worth waking threads for
+  // Fewer are in the caches, so that planning costs 2 to 7 % and gains nothing.
+  static constexpr std::size_t kFewBallsToPlan = 5000;
   static constexpr int kErasToSettle = 16;
+  static constexpr int kFramesPerGivingBack = 16;
   // Longer slices: more impacts share balls. Shorter: less is near in memory. A flat optimum.
   static constexpr double kImpactsPerBallAndSlice = 0.015;
 
@@ -233,8 +235,20 @@ class Continuous final : public Method {
     WorkerPool& pool = pools_.forWork(balls_.size(), kFewBalls);
     frame_.open({now_, limit, era_, origin_, statistics_.ball_collisions}, pool);
     pending_.clear();
+    if (++frames_since_giving_back_ >= kFramesPerGivingBack) giveBackRoom();
     search_.findAll(pool, pending_);
     impacts_in_frame_ = pending_.size();
+    most_pending_ = impacts_in_frame_ + impacts_in_frame_ / 2;
+  }
+
+  void giveBackRoom() {
+    frames_since_giving_back_ = 0;
+    pending_.giveBackRoom();
+    slice_.giveBackRoom();
+    waiting_.giveBackRoom();
+    search_.giveBackRoom();
+    plans_.giveBackRoom();
+    report_.giveBackRoom();
   }
 
   // Takes all impacts up to a time, and those that follow from them.
@@ -244,7 +258,7 @@ class Continuous final : public Method {
       slice_end_ = sliceEnd(until, max_events);
       gather();
       if (isWorthPlanning(max_events)) {
-        plans_.make(slice_, slice_end_, waiting_, pending_);
+        plans_.make(slice_, now_, slice_end_, waiting_, pending_);
       } else {
         for (const Impact<Real>& impact : slice_) waiting_.push(impact);
       }
@@ -259,8 +273,8 @@ class Continuous final : public Method {
   }
 
   bool isWorthPlanning(std::uint64_t max_events) const {
-    return frame_.oneImageIsNear() && slice_.size() >= plans_.kFewImpacts &&
-           slice_.size() <= max_events;
+    return balls_.size() >= kFewBallsToPlan && frame_.oneImageIsNear() &&
+           slice_.size() >= plans_.kFewImpacts && slice_.size() <= max_events;
   }
 
   // A slice of the frame so long that few of its impacts have to do with each other.
@@ -277,27 +291,29 @@ class Continuous final : public Method {
   // Takes the impacts of the slice out of the pending ones; they stay in the order of the grid.
   void gather() {
     slice_.clear();
+    const bool drops_stale = pending_.size() > most_pending_;
     std::size_t kept = 0;
     for (const Impact<Real>& impact : pending_) {
       if (impact.time > slice_end_) {
-        pending_[kept++] = impact;
+        if (!drops_stale || !isStale(impact, balls_)) pending_[kept++] = impact;
       } else if (!isStale(impact, balls_)) {
         slice_.push_back(impact);
       }
     }
     pending_.resize(kept);
+    if (drops_stale) most_pending_ = std::max(most_pending_, kept + kept / 2);
   }
 
   // Takes what waits for its turn, the earliest first, and what follows up to the end of the slice;
   // then what is planned.
   // @return false when `max_events` was not enough
   bool takeInOrder(std::uint64_t& max_events) {
-    const std::vector<Impact<Real>>& waiting = waiting_.impacts();
+    const Buffer<Impact<Real>>& waiting = waiting_.impacts();
     while (!waiting.empty()) {
       const Impact<Real> impact = waiting.front();
       if (!isStale(impact, balls_) && max_events <= plans_.left()) {
         settlePlans(&impact, max_events);
-        pending_.insert(pending_.end(), waiting.begin(), waiting.end());
+        pending_.append(waiting);
         waiting_.clear();
         return false;
       }
@@ -320,7 +336,7 @@ class Continuous final : public Method {
 
   // The first of the heap are among the next.
   void fetchSoonest() const {
-    const std::vector<Impact<Real>>& waiting = waiting_.impacts();
+    const Buffer<Impact<Real>>& waiting = waiting_.impacts();
     for (std::size_t i = 0; i < std::min(waiting.size(), std::size_t{3}); ++i) {
       frame_.fetchBall(waiting[i].a);
       if (waiting[i].b < kWall) frame_.fetchBall(waiting[i].b);
@@ -428,7 +444,7 @@ class Continuous final : public Method {
   void count(const Outcome<Real>& outcome) {
     if (!outcome.happens()) return;
     ++statistics_.ball_collisions;
-    statistics_.virial += double(outcome.passed.exchange.impulse * outcome.reach());
+    virial_.add(double(outcome.passed.exchange.impulse * outcome.reach()));
     noteOverlap(outcome.passed.overlap);
   }
 
@@ -465,12 +481,14 @@ class Continuous final : public Method {
   Balls<Real, kGravity> balls_;
   Frame<Real, kGravity> frame_;
   ImpactSearch<Real, kGravity> search_;
-  std::vector<Impact<Real>> pending_;  // of the frame: found, and not looked at since
-  std::size_t impacts_in_frame_ = 0;   // found at its start
+  Buffer<Impact<Real>> pending_;      // of the frame: found, and not looked at since
+  std::size_t impacts_in_frame_ = 0;  // found at its start
+  std::size_t most_pending_ = 0;      // before stale ones are looked for
+  int frames_since_giving_back_ = 0;
 
   // The slice.
-  Real slice_end_ = 0;               // s, in this era
-  std::vector<Impact<Real>> slice_;  // its impacts
+  Real slice_end_ = 0;          // s, in this era
+  Buffer<Impact<Real>> slice_;  // its impacts
   Plans<Real, kGravity> plans_;
   ImpactHeap<Real, kGravity> waiting_;  // those taken in turn
   CollisionReport<Real, kGravity> report_;
@@ -482,6 +500,7 @@ class Continuous final : public Method {
   Time reached_;  // what now() tells
   OrderWatch<Real> watch_;
   Statistics statistics_;
+  ExactSum virial_;  // J; as slices end anywhere, its terms come in any order
   CollisionLog* log_ = nullptr;
 };
 

@@ -55,7 +55,6 @@ class Frame {
       fillGrid(from, pool);
     }
     if (++frames_since_renumbering_ >= kFramesPerRenumbering) renumber(pool);
-    notePositions();
     open_ = true;
   }
 
@@ -76,7 +75,7 @@ class Frame {
   SweptBall inGrid(const Path<Real>& path) const {
     SweptBall ball = swept(path);
     if (balls_.box.repeats()) {
-      const std::array<int, 3> turns = turnsInGrid(ball, positions_[path.slot]);
+      const std::array<int, 3> turns = turnsInGrid(ball, grid_.positions()[path.slot]);
       for (std::size_t k = 0; k < 3; ++k) {
         ball.middle[k] += turns[k] * double(balls_.box.period(k));
       }
@@ -86,8 +85,7 @@ class Frame {
 
   /// The grid has found b, from a, in some image: which one is it of the places stored?
   /// @param seen  periods from where the grid has b to the image that was found
-  Turns turnsBetween(const Path<Real>& a, const Path<Real>& b,
-                     const std::array<int, 3>& seen) const {
+  Turns turnsBetween(const Path<Real>& a, const Path<Real>& b, const Turns& seen) const {
     const std::array<int, 3> own = turnsInGrid(a);
     const std::array<int, 3> others = turnsInGrid(b);
     Turns turns{};
@@ -101,24 +99,24 @@ class Frame {
   /// @return the path in the grid
   SweptBall change(Slot slot) {
     const SweptBall rest = inGrid(balls_.pathOf(slot));
-    if (open_ && !grid_.change(positions_[slot], rest)) open_ = false;
+    if (open_ && !grid_.change(grid_.positions()[slot], rest)) open_ = false;
     return rest;
   }
 
   /// Lets the grid show a path that a ball may take, beside the one that it has. Threads may do so
   /// for different balls.
   /// @return false when it leads too far
-  bool add(const Path<Real>& path) { return grid_.add(positions_[path.slot], inGrid(path)); }
+  bool add(const Path<Real>& path) { return grid_.add(grid_.positions()[path.slot], inGrid(path)); }
 
   /// Fetches from memory what an impact of a ball will need: the ball, and afterwards its path in
   /// the grid.
   void fetchBall(Slot slot) const {
     balls_.fetch(slot);
-    touch(&positions_[slot]);
+    touch(&grid_.positions()[slot]);
   }
-  void fetchPath(Slot slot) const { grid_.fetch(positions_[slot]); }
+  void fetchPath(Slot slot) const { grid_.fetch(grid_.positions()[slot]); }
 
-  std::size_t bytes() const { return grid_.bytes() + capacityBytes(positions_); }
+  std::size_t bytes() const { return grid_.bytes(); }
 
  private:
   static constexpr std::uint32_t kFramesPerLayout = 64;
@@ -193,16 +191,8 @@ class Frame {
   // memory.
   void renumber(WorkerPool& pool) {
     frames_since_renumbering_ = 0;
-    notePositions();
-    balls_.moveTo(positions_, pool);
+    balls_.moveTo(grid_.positions(), pool);
     grid_.renumber();
-  }
-
-  void notePositions() {
-    positions_.resize(balls_.size());
-    for (std::size_t p = 0; p < balls_.size(); ++p) {
-      positions_[grid_.slotAt(p)] = static_cast<std::uint32_t>(p);
-    }
   }
 
   // A ball's path from its last change in this frame to the end of the frame.
@@ -243,7 +233,7 @@ class Frame {
 
   // So many periods lies the image that the grid has of a ball from the one that its body tells.
   std::array<int, 3> turnsInGrid(const Path<Real>& path) const {
-    return turnsInGrid(swept(path), positions_[path.slot]);
+    return turnsInGrid(swept(path), grid_.positions()[path.slot]);
   }
   std::array<int, 3> turnsInGrid(const SweptBall& ball, std::size_t position) const {
     std::array<int, 3> turns = {0, 0, 0};
@@ -263,8 +253,7 @@ class Frame {
   Real start_ = 0;  // s, in this era
   Real end_ = 0;    // s, in this era
   SweptGrid grid_;
-  HugePageVector<std::uint32_t> positions_;  // in the grid, by slot
-  bool one_image_is_near_ = true;            // of any ball to another that it may meet
+  bool one_image_is_near_ = true;  // of any ball to another that it may meet
 
   // How frames and cells were chosen.
   Real length_ = 0;                              // s

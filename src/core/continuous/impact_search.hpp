@@ -16,6 +16,7 @@
 
 #include "ball_sim/time_of_impact.hpp"
 #include "continuous/balls.hpp"
+#include "continuous/buffer.hpp"
 #include "continuous/frame.hpp"
 #include "continuous/impacts.hpp"
 #include "continuous/swept_grid.hpp"
@@ -26,16 +27,16 @@ namespace ball_sim::core::continuous {
 /// Two balls that may meet.
 struct Pair {
   Slot slot;
-  std::uint32_t other;       ///< its position in the grid, from identify() on its slot
-  std::array<int, 3> turns;  ///< of the image that was found; 0 where only one is near
+  std::uint32_t other;  ///< its position in the grid, from identify() on its slot
+  Turns turns;          ///< of the image that was found; 0 where only one is near
 };
 
 /// What one thread needs to search.
 template <class Real>
 struct alignas(64) Searcher {
   SweptSearch search;
-  std::vector<Pair> pairs;          ///< found, and not looked at yet
-  std::vector<Impact<Real>> found;  ///< to be collected
+  Buffer<Pair> pairs;          ///< found, and not looked at yet
+  Buffer<Impact<Real>> found;  ///< to be collected
 };
 
 constexpr std::size_t kBatch = 64;  ///< searches whose memory is asked for at once
@@ -58,7 +59,9 @@ class ImpactSearch {
 
   /// All impacts in a frame that has just begun, each pair's from one of its ends, in the order of
   /// the grid.
-  void findAll(WorkerPool& pool, std::vector<Impact<Real>>& impacts) {
+  /// @param impacts  takes them; empty
+  void findAll(WorkerPool& pool, Buffer<Impact<Real>>& impacts) {
+    searchers_.front().found.swap(impacts);  // written where they are kept, but for other threads'
     share(pool, balls_.size(), [this](std::size_t begin, std::size_t end, unsigned thread) {
       Searcher<Real>& searcher = searchers_[thread];
       searcher.search.ahead_of = SweptSearch::kNoCell;  // of another frame
@@ -68,15 +71,16 @@ class ImpactSearch {
         considerPairs(searcher);
       });
     });
+    searchers_.front().found.swap(impacts);
     collect(impacts);
   }
 
   Searcher<Real>& searcher(unsigned thread) { return searchers_[thread]; }
 
   /// Appends what the searchers have found.
-  void collect(std::vector<Impact<Real>>& impacts) {
+  void collect(Buffer<Impact<Real>>& impacts) {
     for (Searcher<Real>& searcher : searchers_) {
-      impacts.insert(impacts.end(), searcher.found.begin(), searcher.found.end());
+      impacts.append(searcher.found);
       searcher.found.clear();
     }
   }
@@ -130,8 +134,7 @@ class ImpactSearch {
 
   /// The impact of two balls. Only `time` is valid where it lies after the end of the frame.
   /// @param turns  periods from where the grid has b to the image that was found
-  Impact<Real> meeting(const Path<Real>& a, const Path<Real>& b,
-                       const std::array<int, 3>& turns) const {
+  Impact<Real> meeting(const Path<Real>& a, const Path<Real>& b, const Turns& turns) const {
     Impact<Real> impact;
     impact.a = a.slot;
     impact.b = b.slot;
@@ -177,6 +180,13 @@ class ImpactSearch {
     impact.version_a = impact.version_b = path.card->version;
     impact.image = {0, 0, 0};
     return impact;
+  }
+
+  void giveBackRoom() {
+    for (Searcher<Real>& searcher : searchers_) {
+      searcher.pairs.giveBackRoom();
+      searcher.found.giveBackRoom();
+    }
   }
 
   std::size_t bytes() const {

@@ -7,10 +7,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <utility>
-#include <vector>
 
 #include "ball_sim/ball.hpp"
 #include "continuous/balls.hpp"
+#include "continuous/buffer.hpp"
 #include "impact.hpp"
 
 namespace ball_sim::core::continuous {
@@ -74,9 +74,10 @@ class ImpactHeap {
   }
 
   void clear() { impacts_.clear(); }
+  void giveBackRoom() { impacts_.giveBackRoom(); }
 
   /// All, as the heap has them; the first is the earliest, those after it are among the next.
-  const std::vector<Impact<Real>>& impacts() const { return impacts_; }
+  const Buffer<Impact<Real>>& impacts() const { return impacts_; }
 
  private:
   auto after() const {
@@ -84,7 +85,7 @@ class ImpactHeap {
   }
 
   ImpactOrder<Real, kGravity> before_;
-  std::vector<Impact<Real>> impacts_;
+  Buffer<Impact<Real>> impacts_;
 };
 
 /// A ball after an impact.

@@ -36,6 +36,7 @@ class PeriodicBox {
   /// The image of x that lies in the box.
   Vec wrapped(Vec x) const {
     using std::floor;
+    if (!repeats_) return x;
     for (int axis = 0; axis < 3; ++axis) {
       if (!(period_[axis] > 0)) continue;
       const Real low = low_[axis];

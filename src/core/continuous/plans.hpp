@@ -2,12 +2,13 @@
 // grid, instead of one after the other in order of time.
 //
 // The impacts of a short slice hardly have to do with each other. Those whose balls have no other
-// one in it are planned: what each leads to is computed without changing anything. A plan holds
-// unless a path that it leads to meets another within the slice, be it one of now or one that is
-// planned too. A plan that does not hold is dropped: its impact waits for its turn, with those that
-// share balls. What happens there may end more plans: they are dropped, too, or come true where
-// they are the earlier ones. At the end of the slice, or where it is interrupted, the plans that
-// are left come true. So plans change no bit: until then they have changed nothing.
+// one in it, nor may have one at the same instant in the next, are planned: what each leads to is
+// computed without changing anything. A plan holds unless a path that it leads to meets another
+// within the slice, be it one of now or one that is planned too. A plan that does not hold is
+// dropped: its impact waits for its turn, with those that share balls. What happens there may end
+// more plans: they are dropped, too, or come true where they are the earlier ones. At the end of
+// the slice, or where it is interrupted, the plans that are left come true. So plans change no bit:
+// until then they have changed nothing.
 //
 // While there are plans, the grid shows both paths of their balls.
 #pragma once
@@ -18,6 +19,7 @@
 #include <vector>
 
 #include "continuous/balls.hpp"
+#include "continuous/buffer.hpp"
 #include "continuous/frame.hpp"
 #include "continuous/impact_search.hpp"
 #include "continuous/impacts.hpp"
@@ -47,20 +49,23 @@ class Plans {
 
   /// Plans what can be planned of a slice.
   /// @param slice      all its impacts, none stale
-  /// @param slice_end  s, in this era
+  /// @param slice_begin, slice_end  s, in this era
   /// @param waiting    empty; takes those that are not planned
   /// @param later      takes what plans lead to between slice and end of frame
-  void make(const std::vector<Impact<Real>>& slice, Real slice_end, Heap& waiting,
-            std::vector<Impact<Real>>& later) {
+  void make(const Buffer<Impact<Real>>& slice, Real slice_begin, Real slice_end, Heap& waiting,
+            Buffer<Impact<Real>>& later) {
     slice_end_ = slice_end;
+    const Real instant = Real(kInstant) * (frame_.end() - frame_.start());
+    earliest_ = slice_begin + instant;
+    latest_ = slice_end - instant;
     chooseLone(slice, waiting);
-    left_ = count_ = lone_.size();
-    if (plans_.size() < count_) plans_.resize(count_ + count_ / 4);
-    first_version_ = balls_.takeVersions(count_);
-    share(threads(), count_, [this](std::size_t begin, std::size_t end, unsigned) {
+    left_ = lone_.size();
+    plans_.resize(left_);
+    first_version_ = balls_.takeVersions(left_);
+    share(threads(), plans_.size(), [this](std::size_t begin, std::size_t end, unsigned) {
       inBatches(begin, end, [this](std::size_t first, std::size_t last) { draw(first, last); });
     });
-    share(threads(), count_, [this](std::size_t begin, std::size_t end, unsigned thread) {
+    share(threads(), plans_.size(), [this](std::size_t begin, std::size_t end, unsigned thread) {
       inBatches(begin, end, [this, thread](std::size_t first, std::size_t last) {
         check(first, last, search_.searcher(thread), disturbed_[thread].plans);
       });
@@ -99,12 +104,12 @@ class Plans {
   /// @param bound  nullptr, or only those before this impact: the others are dropped
   void settle(const Impact<Real>* bound, Heap& waiting) {
     if (bound != nullptr && left_ > 0) {
-      for (std::uint32_t i = 0; i < count_; ++i) {
+      for (std::uint32_t i = 0; i < plans_.size(); ++i) {
         const Plan& plan = plans_[i];
         if (plan.state == State::open && !before_(plan.outcome.impact, *bound)) drop(i, waiting);
       }
     }
-    share(threads(), count_, [this](std::size_t begin, std::size_t end, unsigned) {
+    share(threads(), plans_.size(), [this](std::size_t begin, std::size_t end, unsigned) {
       for (std::size_t i = begin; i < end; ++i) {
         if (plans_[i].state == State::open) comeTrue(plans_[i]);
       }
@@ -114,13 +119,22 @@ class Plans {
   /// Calls f with the outcome of each plan that has come true, in the order of the grid.
   template <class Function>
   void forEachThatCameTrue(const Function& f) const {
-    for (std::size_t i = 0; i < count_; ++i) {
-      if (plans_[i].state == State::came_true) f(plans_[i].outcome);
+    for (const Plan& plan : plans_) {
+      if (plan.state == State::came_true) f(plan.outcome);
     }
   }
 
   /// Forgets plans that have been settled.
-  void clear() { count_ = left_ = 0; }
+  void clear() {
+    plans_.clear();
+    left_ = 0;
+  }
+
+  void giveBackRoom() {
+    plans_.giveBackRoom();
+    lone_.giveBackRoom();
+    for (Disturbed& disturbed : disturbed_) disturbed.plans.giveBackRoom();
+  }
 
   std::size_t bytes() const {
     std::size_t bytes = capacityBytes(lone_) + capacityBytes(plans_) + capacityBytes(plan_of_);
@@ -143,16 +157,21 @@ class Plans {
 
   // Plans that a thread has found not to hold.
   struct alignas(64) Disturbed {
-    std::vector<std::uint32_t> plans;
+    Buffer<std::uint32_t> plans;
   };
 
   static constexpr std::size_t kFewPlans = 200;  // not worth waking threads for
+  // Of a frame, in which the fastest ball moves by a thirtieth of a radius or more. Impacts so near
+  // to a slice's end are taken in turn, where OrderWatch sees them: one that shares a ball with
+  // them at the same instant may be in the next slice. Wide enough for speeds of approach down to
+  // 1e-5 of the fastest ball's, and one impact in a thousand.
+  static constexpr double kInstant = 0x1p-16;
   // Instead of a plan's index.
   static constexpr std::uint32_t kNoPlan = 0xFFFFFFFF;
   static constexpr std::uint32_t kOneImpact = 0xFFFFFFFE;
   static constexpr std::uint32_t kManyImpacts = 0xFFFFFFFD;
 
-  WorkerPool& threads() { return pools_.forWork(count_, kFewPlans); }
+  WorkerPool& threads() { return pools_.forWork(plans_.size(), kFewPlans); }
 
   bool isPlanned(Slot slot) const { return plan_of_[slot] != kNoPlan; }
 
@@ -165,7 +184,7 @@ class Plans {
   // --- choice
 
   // Sorts out the impacts of the slice that share no ball; the others wait for their turn.
-  void chooseLone(const std::vector<Impact<Real>>& slice, Heap& waiting) {
+  void chooseLone(const Buffer<Impact<Real>>& slice, Heap& waiting) {
     plan_of_.resize(balls_.size(), kNoPlan);
     lone_.clear();
     for (const Impact<Real>& impact : slice) {
@@ -197,7 +216,8 @@ class Plans {
   // Impacts with walls, and of balls that rest on walls, are taken in turn.
   bool isLone(const Impact<Real>& impact) const {
     return impact.b < kWall && !balls_.isResting(impact.a) && !balls_.isResting(impact.b) &&
-           plan_of_[impact.a] == kOneImpact && plan_of_[impact.b] == kOneImpact;
+           plan_of_[impact.a] == kOneImpact && plan_of_[impact.b] == kOneImpact &&
+           impact.time > earliest_ && impact.time < latest_;
   }
 
   // --- planning, by all threads
@@ -232,7 +252,7 @@ class Plans {
 
   // Finds which plans do not hold, and what some plans lead to after the slice.
   void check(std::size_t begin, std::size_t end, Searcher<Real>& searcher,
-             std::vector<std::uint32_t>& disturbed) const {
+             Buffer<std::uint32_t>& disturbed) const {
     const auto note = [&](const Impact<Real>& impact) {
       if (impact.time <= slice_end_) {
         forBalls(impact, [&](Slot slot) {
@@ -313,10 +333,10 @@ class Plans {
   WorkerPools& pools_;
   ImpactOrder<Real, kGravity> before_;
 
-  Real slice_end_ = 0;              // s, in this era
-  std::vector<Impact<Real>> lone_;  // those planned
-  std::vector<Plan> plans_;         // of which the first count_ are of this slice
-  std::size_t count_ = 0;
+  Real slice_end_ = 0;                  // s, in this era
+  Real earliest_ = 0, latest_ = 0;      // s, in this era: what is planned lies between
+  Buffer<Impact<Real>> lone_;           // those planned
+  Buffer<Plan> plans_;                  // of this slice
   std::size_t left_ = 0;                // of these, not dropped
   std::uint32_t first_version_ = 0;     // of the first plan's balls, once it comes true; then on
   std::vector<std::uint32_t> plan_of_;  // by slot

@@ -257,8 +257,8 @@ void SweptGrid::findInBox(const Level& level, const SweptBall& ball, double reac
 
 void SweptGrid::findAhead(std::size_t position, std::size_t level, SweptSearch& search) const {
   const Level& own = levels_[level];
-  const std::uint32_t key = keys_[slots_[position]];
-  if (key != search.ahead_of) runsAhead(key, own, search);
+  search.cell = cellAt(position, search.cell);
+  if (search.cell != search.ahead_of) runsAhead(search.cell, own, search);
   if (own.has_ahead) search.runs.front().begin = static_cast<std::uint32_t>(position) + 1;
   run(first_[position], search);
   if (own.has_ahead) return;
@@ -299,13 +299,14 @@ SweptGrid::Range SweptGrid::nearOf(const Level& level, std::size_t k, Cell cell)
   return range;
 }
 
-std::array<int, 3> SweptGrid::imageOf(const LaneHit& hit, const SweptSearch& search) const {
+std::array<std::int16_t, 3> SweptGrid::imageOf(const LaneHit& hit,
+                                               const SweptSearch& search) const {
   const LaneRun& run = search.runs[hit.run];
   const std::array<float, 3> shift = {run.sx, run.sy, run.sz};
-  std::array<int, 3> image = {0, 0, 0};
+  std::array<std::int16_t, 3> image = {0, 0, 0};
   for (std::size_t k = 0; k < 3; ++k) {
     if (axes_[k].kind != SweptAxis::Kind::periodic) continue;
-    image[k] = static_cast<int>(std::lround(double(shift[k]) * unit_ / axes_[k].length));
+    image[k] = static_cast<std::int16_t>(std::lround(double(shift[k]) * unit_ / axes_[k].length));
   }
   return image;
 }

@@ -52,6 +52,7 @@ struct SweptSearch {
   std::size_t lane_count = 0;  ///< of all runs
   std::vector<LaneHit> hits;
   std::size_t count = 0;             ///< of the hits
+  std::uint32_t cell = 0;            ///< where findAhead() was last
   std::uint32_t ahead_of = kNoCell;  ///< the runs are those ahead of the balls of this cell
 
   static constexpr std::uint32_t kNoCell = ~std::uint32_t{0};
@@ -86,15 +87,11 @@ class SweptGrid {
 
   std::uint32_t slotAt(std::size_t position) const { return slots_[position]; }
   void fetchSlot(std::size_t position) const { touch(&slots_[position]); }
+  const HugePageVector<std::uint32_t>& positions() const { return positions_; }  ///< by slot
 
   /// From now on the ball at each position has the position's own number.
   void renumber() {
-    for (std::uint32_t key = 0; key < cells_; ++key) {
-      for (std::uint32_t p = begins()[key]; p < begins()[key + 1]; ++p) {
-        slots_[p] = p;
-        keys_[p] = key;
-      }
-    }
+    for (std::uint32_t p = 0; p < slots_.size(); ++p) slots_[p] = positions_[p] = p;
   }
 
   std::size_t levels() const { return levels_.size(); }
@@ -118,7 +115,7 @@ class SweptGrid {
   }
 
   /// So many periods along each axis lies the image that was hit from the one that middleAt tells.
-  std::array<int, 3> imageOf(const LaneHit& hit, const SweptSearch& search) const;
+  std::array<std::int16_t, 3> imageOf(const LaneHit& hit, const SweptSearch& search) const;
 
   /// Fetches from memory what change() or add() of a ball needs.
   void fetch(std::size_t p) const {
@@ -159,8 +156,8 @@ class SweptGrid {
   }
 
   std::size_t bytes() const {
-    std::size_t bytes = lanes_.bytes() + (slots_.capacity() + keys_.capacity()) * 4 +
-                        (first_.capacity() + unsorted_.capacity()) * sizeof(SweptSphere);
+    std::size_t bytes = lanes_.bytes() + (slots_.capacity() + positions_.capacity()) * 4 +
+                        first_.capacity() * sizeof(SweptSphere);
     for (const Worker& worker : workers_) bytes += worker.ends.capacity() * 4;
     return bytes;
   }
@@ -300,6 +297,16 @@ class SweptGrid {
   void countWorkers(unsigned workers);
   void sumUp();
   void setNear(Level& level) const;
+  // The cell that holds a ball. Quick where it is not far behind another one.
+  std::uint32_t cellAt(std::size_t position, std::uint32_t before) const {
+    const std::uint32_t* const begins = this->begins();
+    if (before >= cells_ || position < begins[before]) {
+      const std::uint32_t* const after = std::upper_bound(begins, begins + cells_, position);
+      return static_cast<std::uint32_t>(after - begins) - 1;
+    }
+    while (position >= begins[before + 1]) ++before;
+    return before;
+  }
   void runsAhead(std::uint32_t key, const Level& level, SweptSearch& search) const;
   Range nearOf(const Level& level, std::size_t k, Cell cell) const;
 
@@ -315,10 +322,9 @@ class SweptGrid {
   double per_unit_ = 1;                       // 1/m
   float margin_ = 0;                          // unit, what single precision may falsify
   SweptLanes lanes_;
-  HugePageVector<SweptSphere> first_;     // lanes_ at the start of the frame, by position
-  HugePageVector<SweptSphere> unsorted_;  // the same by slot
-  HugePageVector<std::uint32_t> slots_;   // by position
-  HugePageVector<std::uint32_t> keys_;    // by slot: the cell
+  HugePageVector<SweptSphere> first_;        // lanes_ at the start of the frame, by position
+  HugePageVector<std::uint32_t> slots_;      // by position
+  HugePageVector<std::uint32_t> positions_;  // by slot; while they are filled in, cells
   std::vector<Worker> workers_;
 };
 
@@ -363,9 +369,8 @@ void SweptGrid::layOut(std::size_t count, const Describe& describe) {
 template <class Describe>
 void SweptGrid::fill(std::size_t count, const Describe& describe, WorkerPool& pool) {
   slots_.resize(count);
-  keys_.resize(count);
+  positions_.resize(count);
   first_.resize(count);
-  unsorted_.resize(count);
   lanes_.resize(count);
   countWorkers(pool.size());
   margin_ = 0;
@@ -383,22 +388,26 @@ void SweptGrid::fill(std::size_t count, const Describe& describe, WorkerPool& po
       worker.longest = std::max(worker.longest, ball.half_length);
       worker.farthest = std::max(std::max(worker.farthest, std::abs(sphere.x)),
                                  std::max(std::abs(sphere.y), std::abs(sphere.z)));
-      unsorted_[i] = sphere;
-      keys_[i] = keyOf(levels_[level], sphere);
-      ++worker.ends[keys_[i] + 1];
+      lanes_.set(i, sphere);  // by slot, until all have their positions
+      const std::uint32_t key = keyOf(levels_[level], sphere);
+      positions_[i] = key;
+      ++worker.ends[key + 1];
     }
   });
   sumUp();
   share(pool, count, [&](std::size_t begin, std::size_t end, unsigned w) {
     Worker& worker = workers_[w];
     for (std::size_t i = begin; i < end; ++i) {
-      const std::uint32_t p = worker.ends[keys_[i] + 1]++;
+      const std::uint32_t p = worker.ends[positions_[i] + 1]++;
+      positions_[i] = p;
       slots_[p] = static_cast<std::uint32_t>(i);
-      SweptSphere sphere = unsorted_[i];
+      SweptSphere sphere = lanes_.at(i);
       sphere.r += margin_;
       first_[p] = sphere;
-      lanes_.set(p, sphere);
     }
+  });
+  share(pool, count, [&](std::size_t begin, std::size_t end, unsigned) {
+    for (std::size_t p = begin; p < end; ++p) lanes_.set(p, first_[p]);
   });
 }
 
