@@ -320,14 +320,6 @@ class CellGrid {
     return static_cast<std::int32_t>(axes_[axis].cells << plans_[level].home_depth);
   }
 
-  /// Whether a box face bounds the cell of a member at home at a coordinate, towards `direction`
-  /// (-1 or +1).
-  bool isWall(std::size_t axis, std::size_t level, std::int32_t coordinate, int direction) const {
-    const std::array<std::int32_t, 2>& beside = beside_wall_[level][axis];
-    if (direction < 0) return coordinate <= beside[0];
-    return coordinate >= beside[1];
-  }
-
   /// The cell around a place, in cells whose edges are halved `depth` times.
   CellCoordinates coordinatesOf(const VectorOf<Real>& x, int depth) const {
     using std::floor;
@@ -470,26 +462,17 @@ class CellGrid {
             plan.home_depth - plan.depth};
   }
 
-  // By axis, the last coordinate beside its lower wall and the first beside its upper one. A fourth
-  // axis makes the size a power of two.
-  using BesideWall = std::array<std::array<std::int32_t, 2>, 4>;
-
-  // Homes, and which of them are beside walls.
+  // Homes; no ball leaves them through a wall.
   void addLattice(const LevelPlan<Real>& plan) {
     Lattice<Real> homes = lattice(plan.home_depth);
-    BesideWall beside;
-    constexpr std::int32_t kNowhere = std::numeric_limits<std::int32_t>::max();
-    const std::int32_t within_cell = (1 << (plan.home_depth - plan.depth)) - 1;
     for (std::size_t k = 0; k < 3; ++k) {
-      const auto last = static_cast<std::int32_t>(cells(k, plan.home_depth)) - 1;
       homes.has_ends |= axes_[k].lower_wall || axes_[k].upper_wall;
       if (axes_[k].lower_wall) homes.end[k][0] = 0;
-      if (axes_[k].upper_wall) homes.end[k][1] = last;
-      beside[k] = {axes_[k].lower_wall ? within_cell : -kNowhere,
-                   axes_[k].upper_wall ? last - within_cell : kNowhere};
+      if (axes_[k].upper_wall) {
+        homes.end[k][1] = static_cast<std::int32_t>(cells(k, plan.home_depth)) - 1;
+      }
     }
     lattices_.push_back(homes);
-    beside_wall_[lattices_.size() - 1] = beside;
   }
 
   CellCoordinates memberCell(const CellCoordinates& home, std::size_t level) const {
@@ -555,7 +538,6 @@ class CellGrid {
   std::vector<CellLevel> levels_;
   std::vector<GuestCells> guests_;       // of all levels but the finest
   std::vector<Lattice<Real>> lattices_;  // of homes
-  std::array<BesideWall, kMostLevels> beside_wall_{};
 };
 
 }  // namespace ball_sim::core

@@ -441,7 +441,7 @@ class EventDriven final : public Method {
   void findNextEvent(Slot slot, const Met& met = {}) {
     NextImpact<Real> next;
     impacts_.considerBalls(slot, met, nearTo(slot), next);
-    impacts_.considerWalls(slot, neighbourhood_, next);
+    impacts_.considerWalls(slot, next);
     setImpact(slot, next);
     findWayOut(slot);
   }
@@ -504,7 +504,6 @@ class EventDriven final : public Method {
     if (!space_.nearestSuffices()) return search(slot);  // other images are in reach now, too
     NextImpact<Real> next{own.impact_time, own.partner};
     impacts_.considerBalls(slot, {}, neighbourhood_.newcomers(own), next);
-    impacts_.considerWalls(slot, neighbourhood_, next);
     if (next.time < own.impact_time) setImpact(slot, next);
     findWayOut(slot);
     queue_.insert(slot);

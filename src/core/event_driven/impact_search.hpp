@@ -44,11 +44,13 @@ class ImpactSearch {
       : flights_(flights), space_(space), walls_(walls) {
     for (std::uint32_t k = 0; k < walls.size(); ++k) {
       const Partner partner = walls[k].partner;
-      if (partner > planePartner(0)) {
-        face_walls_[static_cast<std::size_t>(-1 - partner)] = k;
-      } else {
-        planes_.push_back(k);
+      if (kGravity || partner <= planePartner(0)) {
+        others_.push_back(k);
+        continue;
       }
+      const auto face = static_cast<std::size_t>(-1 - partner);
+      const Real direction = face % 2 == 0 ? -1 : 1;
+      faces_[face] = {-direction * walls[k].offset, direction, kWall + k};
     }
   }
 
@@ -74,22 +76,29 @@ class ImpactSearch {
     });
   }
 
-  /// The same with walls. Box faces are only met from beside them; planes from anywhere.
-  void considerWalls(Slot slot, const Neighbourhood<Real>& neighbourhood, Next& next) const {
+  /// The same with all walls. What is found holds for the whole flight: crossings change nothing.
+  void considerWalls(Slot slot, Next& next) const {
     if (walls_.empty() || flights_.isFixed(slot)) return;
-    const Agenda<Real>& agenda = flights_.agendas[slot];
-    for (std::size_t face = 0; face < face_walls_.size(); ++face) {
-      if (face_walls_[face] == kNoWall) continue;
-      const int direction = face % 2 == 0 ? -1 : 1;
-      if (neighbourhood.isBesideFace(agenda, face / 2, direction)) {
-        considerWall(slot, face_walls_[face], next);
-      }
-    }
-    for (const std::uint32_t plane : planes_) considerWall(slot, plane, next);
+    if constexpr (!kGravity) considerFaces(slot, next);
+    for (const std::uint32_t wall : others_) considerWall(slot, wall, next);
   }
 
  private:
-  static constexpr std::uint32_t kNoWall = ~std::uint32_t{0};
+  // A face of the box. Where there is none, it is infinitely far.
+  struct Face {
+    Real place;             // m, along its axis
+    Real direction;         // out of the box: -1 or +1
+    std::uint32_t partner;  // as in an agenda
+  };
+
+  static std::array<Face, 6> noFaces() {
+    std::array<Face, 6> faces;
+    for (std::size_t i = 0; i < faces.size(); ++i) {
+      const Real direction = i % 2 == 0 ? -1 : 1;
+      faces[i] = {direction * kNever<Real>, direction, kWall};
+    }
+    return faces;
+  }
 
   struct Search {
     Slot slot;
@@ -158,6 +167,25 @@ class ImpactSearch {
            flights_.agendas[other].id < flights_.agendas[next.partner].id;
   }
 
+  // The faces ahead, for a ball in straight flight. Without branches: which one comes first cannot
+  // be foretold. The arithmetic is that of timeToWall().
+  void considerFaces(Slot slot, Next& next) const {
+    const Vec x = flights_.position(slot);
+    const Vec& v = flights_.bodies[slot].v;
+    const Real radius = flights_.bodies[slot].radius;
+    Next first = next;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto k = static_cast<Eigen::Index>(axis);
+      const Face& face = faces_[2 * axis + (v[k] < 0 ? 0 : 1)];
+      const Real gap = (face.place - x[k]) * face.direction - radius;
+      const Real wait = std::max(gap, Real(0)) / std::abs(v[k]);
+      const Real time = flights_.now + std::min(kNever<Real>, wait);  // 0/0: never
+      first.partner = time < first.time ? face.partner : first.partner;
+      first.time = std::min(first.time, time);
+    }
+    next = first;
+  }
+
   void considerWall(Slot slot, std::uint32_t index, Next& next) const {
     const Wall<Real>& wall = walls_[index];
     if constexpr (kGravity) {
@@ -174,8 +202,8 @@ class ImpactSearch {
   const Flights<Real, kGravity>& flights_;
   const PeriodicSpace<Real>& space_;
   const std::vector<Wall<Real>>& walls_;
-  std::array<std::uint32_t, 6> face_walls_{kNoWall, kNoWall, kNoWall, kNoWall, kNoWall, kNoWall};
-  std::vector<std::uint32_t> planes_;  // indices into walls_
+  std::array<Face, 6> faces_ = noFaces();  // in straight flight; by axis, the lower ones first
+  std::vector<std::uint32_t> others_;      // indices into walls_ of those that are not in faces_
   PairSearch<Real> search_pairs_ = nullptr;
 };
 

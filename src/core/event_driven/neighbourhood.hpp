@@ -62,11 +62,6 @@ class Neighbourhood {
     if (listed_) lists_.resize(slots);
   }
 
-  /// Where along a space-filling curve a place, m, is.
-  std::uint64_t alongCurve(const Vec& x) const {
-    return mortonKey(grid_.coordinatesOf(x, grid_.homeDepth(grid_.finestLevel())));
-  }
-
   /// Puts a ball into its cell.
   /// @param x  m, in the box
   void place(Slot slot, const Vec& x, Real radius, Agenda<Real>& agenda) {
@@ -159,12 +154,6 @@ class Neighbourhood {
   /// ... and which is its own.
   const CellCoordinates& cube(Slot slot, const Agenda<Real>& agenda) const {
     return listed_ ? lists_.home(slot) : agenda.cell;
-  }
-
-  /// Whether a ball can meet the box face at the end of an axis, towards `direction` (-1 or +1),
-  /// before its crossing.
-  bool isBesideFace(const Agenda<Real>& agenda, std::size_t axis, int direction) const {
-    return listed_ || grid_.isWall(axis, agenda.level, agenda.cell[axis], direction);
   }
 
   // --- fetching ahead from memory
