@@ -173,17 +173,23 @@ class ImpactSearch {
     const Vec x = flights_.position(slot);
     const Vec& v = flights_.bodies[slot].v;
     const Real radius = flights_.bodies[slot].radius;
-    Next first = next;
+    std::array<Real, 3> times;
+    std::array<std::uint32_t, 3> partners;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto k = static_cast<Eigen::Index>(axis);
       const Face& face = faces_[2 * axis + (v[k] < 0 ? 0 : 1)];
       const Real gap = (face.place - x[k]) * face.direction - radius;
       const Real wait = std::max(gap, Real(0)) / std::abs(v[k]);
-      const Real time = flights_.now + std::min(kNever<Real>, wait);  // 0/0: never
-      first.partner = time < first.time ? face.partner : first.partner;
-      first.time = std::min(first.time, time);
+      times[axis] = flights_.now + std::min(kNever<Real>, wait);  // 0/0: never
+      partners[axis] = face.partner;
     }
-    next = first;
+    const Real sooner = std::min(times[0], times[1]);
+    const unsigned second = times[1] < times[0] ? 1 : 0;
+    const unsigned third = times[2] < sooner ? 1 : 0;
+    const Real first = std::min(sooner, times[2]);
+    const std::uint32_t partner = partners[2 * third + (second & ~third)];
+    next.partner = first < next.time ? partner : next.partner;
+    next.time = std::min(next.time, first);
   }
 
   void considerWall(Slot slot, std::uint32_t index, Next& next) const {
