@@ -18,6 +18,7 @@
 #include "ball_sim/time_of_impact.hpp"
 #include "ball_sim/vector.hpp"
 #include "ball_sim/walls.hpp"
+#include "capacity_bytes.hpp"
 #include "continuous/periodic_box.hpp"
 #include "continuous/swept_lanes.hpp"
 #include "continuous/worker_pool.hpp"
@@ -65,12 +66,6 @@ struct WallVisit {
   Real time = kNever<Real>;  ///< s, in this era
   std::uint32_t wall = 0;    ///< index into the walls
 };
-
-/// Memory that a vector holds.
-template <class Vector>
-std::size_t capacityBytes(const Vector& v) {
-  return v.capacity() * sizeof(typename Vector::value_type);
-}
 
 /// Arrays by slot, without gaps.
 /// @tparam kGravity  whether balls fall; without it no acceleration is stored or computed

@@ -12,6 +12,7 @@
 #include "ball_sim/collapse_guard.hpp"
 #include "ball_sim/surroundings.hpp"
 #include "ball_sim/vector.hpp"
+#include "capacity_bytes.hpp"
 #include "event_driven/agenda.hpp"
 #include "event_driven/contacts.hpp"
 #include "event_driven/huge_page_vector.hpp"
@@ -20,12 +21,6 @@
 #include "permutation.hpp"
 
 namespace ball_sim::core {
-
-/// Memory that a vector holds.
-template <class Vector>
-std::size_t capacityBytes(const Vector& v) {
-  return v.capacity() * sizeof(typename Vector::value_type);
-}
 
 /// Arrays by slot; a slot is used again when its ball is gone.
 /// @tparam kGravity  whether balls fall; without it no acceleration is stored or computed

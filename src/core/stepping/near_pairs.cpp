@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "ball_sim/ball_check.hpp"
+#include "capacity_bytes.hpp"
 
 namespace ball_sim::core {
 namespace {
@@ -13,11 +14,6 @@ constexpr double kStepsPerList = 10;  // the skin is wide enough for so many
 constexpr double kWidestSkin = 0.4;   // of the largest radius; wider ones list too many pairs
 constexpr std::uint32_t kHome = 13;   // the image that is not shifted
 constexpr double kCellsPerBall = 4;   // at most; emptier grids only cost memory
-
-template <class Vector>
-std::size_t capacityBytes(const Vector& v) {
-  return v.capacity() * sizeof(typename Vector::value_type);
-}
 
 }  // namespace
 

@@ -7,16 +7,9 @@
 
 #include "ball_sim/ball_check.hpp"
 #include "ball_sim/text.hpp"
+#include "capacity_bytes.hpp"
 
 namespace ball_sim::core {
-namespace {
-
-template <class Vector>
-std::size_t capacityBytes(const Vector& v) {
-  return v.capacity() * sizeof(typename Vector::value_type);
-}
-
-}  // namespace
 
 SteppedMethod::SteppedMethod(const Surroundings& surroundings, double time_step)
     : surroundings_(surroundings), clock_(time_step), near_(surroundings) {}
