@@ -11,7 +11,7 @@ namespace ball_sim::core {
 
 /// The balls found near a ball.
 struct Candidates {
-  std::vector<Slot> slots;
+  std::vector<Slot> slots = std::vector<Slot>(256);  // more than are ever around one of equals
   std::size_t count = 0;
 
   /// Makes room for `more` beyond `count`.

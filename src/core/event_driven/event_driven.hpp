@@ -276,7 +276,7 @@ class EventDriven final : public Method {
     flights_.shrink();
     slots_.shrink_to_fit();
     for (const Slot slot : slots_) place(slot);
-    for (const Slot slot : slots_) neighbourhood_.fillList(slot, agenda(slot));
+    neighbourhood_.fillLists(slots_, flights_.agendas);
     balls_at_layout_ = slots_.size();
     crossings_when_sorted_ = crossings_;
     ready_ = true;

@@ -44,8 +44,9 @@ class NeighbourLists {
 
   /// Forgets all lists.
   void reset(std::size_t slots, const Regions& regions) {
-    stride_ = std::max(stride_, kFewest + 1);
-    entries_.assign(slots * stride_ + kSearchStep, 0);
+    lists_.assign(slots, List{});
+    rows_.clear();
+    free_row_ = kNoRow;
     homes_.assign(slots, Home{});
     for (std::size_t k = 0; k < 3; ++k) {
       width_[k] = regions.width[k];
@@ -57,8 +58,15 @@ class NeighbourLists {
   }
 
   void resize(std::size_t slots) {
-    entries_.resize(slots * stride_ + kSearchStep);
+    lists_.resize(slots);
     homes_.resize(slots);
+  }
+
+  /// Once all have their first lists: makes room for as many long ones as may come.
+  void makeRoom() {
+    const std::size_t rows = rows_.size() / row_length_;
+    const std::size_t most = std::max(rows + rows / 4, lists_.size() / kListsPerRow);
+    rows_.reserve((most + kSpareRows) * row_length_);
   }
 
   /// The balls have got other slots.
@@ -67,17 +75,20 @@ class NeighbourLists {
   void renumber(const std::vector<Slot>& to, std::size_t slots) {
     for (Slot slot = 0; slot < to.size(); ++slot) {
       for (Slot* other = begin(slot); other != end(slot); ++other) *other = to[*other];
-      std::fill(end(slot), begin(slot) + capacity(), Slot{0});  // who stood there may be gone
+      std::fill(end(slot), begin(slot) + capacity(slot), Slot{0});  // who stood there may be gone
     }
     exchangeToPlaces(to.size(), to, moved_, [this](Slot a, Slot b) {
       std::swap(homes_[a], homes_[b]);
-      std::swap_ranges(&countOf(a), &countOf(a) + stride_, &countOf(b));
+      std::swap(lists_[a], lists_[b]);
     });
     resize(slots);
   }
 
-  const Slot* of(Slot slot) const { return &entries_[slot * stride_ + 1]; }
-  std::size_t count(Slot slot) const { return entries_[slot * stride_]; }
+  const Slot* of(Slot slot) const {
+    const List& list = lists_[slot];
+    return isLong(list.count) ? &rows_[list.slots[0] * row_length_] : list.slots.data();
+  }
+  std::size_t count(Slot slot) const { return lists_[slot].count; }
 
   /// In points of the lattice.
   const CellCoordinates& home(Slot slot) const { return homes_[slot].at; }
@@ -94,32 +105,44 @@ class NeighbourLists {
   /// accordingly. Parameters as of fill().
   void renew(Slot slot, const Slot* candidates, std::size_t count) {
     findNear(slot, candidates, count);
-    for (Slot* old = begin(slot); old != end(slot); ++old) homes_[*old].mark = Mark::old;
-    for (const Slot other : near_) {
+    forEach(slot, [this](Slot old) { homes_[old].mark = Mark::old; });
+    for (std::size_t i = 0; i < near_count_; ++i) {
+      const Slot other = near_[i];
       if (homes_[other].mark == Mark::old) {
         homes_[other].mark = Mark::kept;
       } else {
         add(other, slot);
       }
     }
-    for (Slot* old = begin(slot); old != end(slot); ++old) {
-      if (homes_[*old].mark == Mark::old) erase(*old, slot);
-      homes_[*old].mark = Mark::none;
-    }
+    forEach(slot, [this, slot](Slot old) {
+      if (homes_[old].mark == Mark::old) erase(old, slot);
+      homes_[old].mark = Mark::none;
+    });
     takeNear(slot);
   }
 
   /// Fetches a list from memory.
-  void prefetch(Slot slot) const { __builtin_prefetch(&entries_[slot * stride_]); }
+  void prefetch(Slot slot) const { __builtin_prefetch(&lists_[slot]); }
   void prefetchHome(Slot slot) const { __builtin_prefetch(&homes_[slot]); }
 
   std::size_t bytes() const {
-    return entries_.capacity() * sizeof(Slot) + homes_.capacity() * sizeof(Home) +
-           moved_.capacity() / 8;
+    return lists_.capacity() * sizeof(List) + rows_.capacity() * sizeof(Slot) +
+           homes_.capacity() * sizeof(Home) + moved_.capacity() / 8;
   }
 
  private:
-  static constexpr std::size_t kFewest = 11;  // neighbours that there is room for
+  static constexpr std::size_t kMostInPlace = 15;
+  // One in 12 lists is long in a fluid of packing fraction 0.49, fewer elsewhere.
+  static constexpr std::size_t kListsPerRow = 10;
+  static constexpr std::size_t kSpareRows = 16;
+  static constexpr Slot kNoRow = kNoSlot;
+
+  // One cache line. Long lists, which are few, lie in rows elsewhere: the first entry tells which.
+  // Searches may read the count as if it were a slot (see kSearchStep), and there is such a slot.
+  struct alignas(64) List {
+    std::array<Slot, kMostInPlace> slots{};
+    Slot count = 0;
+  };
 
   enum class Mark : std::uint32_t { none, old, kept };
 
@@ -141,7 +164,7 @@ class NeighbourLists {
   // Those whose regions come within reach of this ball's.
   void findNear(Slot slot, const Slot* candidates, std::size_t candidate_count) {
     const Whole home = homeOf(slot);
-    near_.resize(candidate_count);
+    if (near_.size() < candidate_count) near_.resize(2 * candidate_count);
     std::size_t count = 0;
     for (std::size_t i = 0; i < candidate_count; ++i) {
       const Slot other = candidates[i];
@@ -156,51 +179,102 @@ class NeighbourLists {
       const bool is_near = squares[0] + squares[1] + squares[2] < squared_reach_;
       count += static_cast<std::size_t>(is_near & (other != slot));
     }
-    near_.resize(count);
+    near_count_ = count;
   }
 
   void takeNear(Slot slot) {
-    if (near_.size() > capacity()) widen(near_.size());
-    std::copy(near_.begin(), near_.end(), begin(slot));
-    countOf(slot) = static_cast<Slot>(near_.size());
+    std::copy_n(near_.begin(), near_count_, changeCount(slot, near_count_));
   }
 
   void add(Slot to, Slot slot) {
-    if (count(to) == capacity()) widen(capacity() + 1);
-    *end(to) = slot;
-    ++countOf(to);
-  }
-
-  // Lists are short: to look at all of one is faster than to guess where to stop.
-  void erase(Slot from, Slot slot) {
-    Slot* const list = begin(from);
-    const Slot last = list[--countOf(from)];
-    for (std::size_t i = 0; i < count(from); ++i) list[i] = list[i] == slot ? last : list[i];
-  }
-
-  // Makes room for more neighbours a ball; the lists stay.
-  void widen(std::size_t capacity) {
-    const std::size_t narrow = std::exchange(stride_, capacity + 1);
-    const HugePageVector<Slot> old = std::move(entries_);
-    entries_.assign(homes_.size() * stride_ + kSearchStep, 0);
-    for (std::size_t slot = 0; slot < homes_.size(); ++slot) {
-      std::copy_n(&old[slot * narrow], narrow, &entries_[slot * stride_]);
+    List& list = lists_[to];
+    if (list.count < kMostInPlace) {
+      list.slots[list.count++] = slot;
+    } else {
+      const std::size_t before = list.count;
+      changeCount(to, before + 1)[before] = slot;
     }
   }
 
-  std::size_t capacity() const { return stride_ - 1; }
-  Slot* begin(Slot slot) { return &entries_[slot * stride_ + 1]; }
-  Slot* end(Slot slot) { return begin(slot) + count(slot); }
-  Slot& countOf(Slot slot) { return entries_[slot * stride_]; }
+  // Lists are short: to look at all of one, and beyond, is faster than to guess where to stop.
+  void erase(Slot from, Slot slot) {
+    List& list = lists_[from];
+    if (isLong(list.count)) {
+      const std::size_t left = list.count - 1;
+      Slot* const row = begin(from);
+      std::replace(row, row + left, slot, row[left]);
+      changeCount(from, left);
+    } else {
+      const Slot last = list.slots[--list.count];
+      for (Slot& other : list.slots) other = other == slot ? last : other;
+    }
+  }
 
-  std::size_t stride_ = 1;
-  HugePageVector<Slot> entries_;  // a count and a list for each slot
+  // Makes a list longer or shorter, where there is room for it. @return where it begins
+  Slot* changeCount(Slot slot, std::size_t count) {
+    List& list = lists_[slot];
+    if (isLong(count) && count > row_length_) widenRows(count);
+    if (isLong(count) != isLong(list.count)) isLong(count) ? moveToRow(list) : moveToPlace(list);
+    list.count = static_cast<Slot>(count);
+    return begin(slot);
+  }
+
+  // While the list stays.
+  template <class Function>
+  void forEach(Slot slot, const Function& f) const {
+    const Slot* const list = of(slot);
+    const std::size_t count = this->count(slot);
+    for (std::size_t i = 0; i < count; ++i) f(list[i]);
+  }
+
+  void moveToRow(List& list) {
+    const Slot row = takeRow();
+    std::copy(list.slots.begin(), list.slots.end(), &rows_[row * row_length_]);
+    list.slots[0] = row;
+  }
+
+  void moveToPlace(List& list) {
+    const Slot row = list.slots[0];
+    std::copy_n(&rows_[row * row_length_], kMostInPlace, list.slots.begin());
+    rows_[row * row_length_] = std::exchange(free_row_, row);
+  }
+
+  Slot takeRow() {
+    if (free_row_ != kNoRow) return std::exchange(free_row_, rows_[free_row_ * row_length_]);
+    const std::size_t rows = rows_.size() / row_length_;
+    rows_.resize((rows + 1) * row_length_);
+    return static_cast<Slot>(rows);
+  }
+
+  // Makes room for longer lists; what the rows hold stays.
+  void widenRows(std::size_t length) {
+    const std::size_t narrow = std::exchange(row_length_, (length / 16 + 1) * 16);
+    const HugePageVector<Slot> old = std::exchange(rows_, {});
+    const std::size_t rows = old.size() / narrow;
+    rows_.resize(rows * row_length_);
+    for (std::size_t row = 0; row < rows; ++row) {
+      std::copy_n(&old[row * narrow], narrow, &rows_[row * row_length_]);
+    }
+  }
+
+  static bool isLong(std::size_t count) { return __builtin_expect(count > kMostInPlace, 0) != 0; }
+
+  std::size_t capacity(Slot slot) const { return isLong(count(slot)) ? row_length_ : kMostInPlace; }
+  Slot* begin(Slot slot) { return const_cast<Slot*>(of(slot)); }
+  Slot* end(Slot slot) { return begin(slot) + count(slot); }
+
+  HugePageVector<List> lists_;
+  HugePageVector<Slot> rows_;    // of the long lists
+  std::size_t row_length_ = 32;  // a multiple of kSearchStep
+  Slot free_row_ = kNoRow;       // the one used last; its first entry tells of another
   HugePageVector<Home> homes_;
   Whole width_{};
   Whole round_{};
   Metres spacing_{};
   float squared_reach_ = 0;
-  std::vector<Slot> near_;   // scratch of a new list
+  // Scratch of a new list, and room for more than are ever around one of equal balls.
+  std::vector<Slot> near_ = std::vector<Slot>(256);
+  std::size_t near_count_ = 0;
   std::vector<bool> moved_;  // scratch of renumber()
 };
 

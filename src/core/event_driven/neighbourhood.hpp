@@ -94,13 +94,19 @@ class Neighbourhood {
     grid_.unlink(slot, agenda.cell, agenda.level);
   }
 
-  /// Gives a ball that was placed its list: the first, when all get theirs, ...
-  void fillList(Slot slot, const Agenda<Real>& agenda) {
+  /// Gives balls that were placed their first lists.
+  /// @param slots    all that there are
+  /// @param agendas  by slot
+  void fillLists(const std::vector<Slot>& slots, const HugePageVector<Agenda<Real>>& agendas) {
     if (!listed_) return;
-    const Near near = inCellsAround(agenda);
-    lists_.fill(slot, near.slots, near.count);
+    for (const Slot slot : slots) {
+      const Near near = inCellsAround(agendas[slot]);
+      lists_.fill(slot, near.slots, near.count);
+    }
+    lists_.makeRoom();
   }
-  /// ... or a new one, with the others' changed accordingly.
+
+  /// Gives a ball that was placed a new list, with the others' changed accordingly.
   void renewList(Slot slot, const Agenda<Real>& agenda) {
     if (!listed_) return;
     const Near near = inCellsAround(agenda);

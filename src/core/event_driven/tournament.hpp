@@ -57,7 +57,10 @@ inline LeastOfGroup<double> leastOfGroup(const double* times) {
 template <class Real, class Before>
 class Tournament {
  public:
-  explicit Tournament(Before before) : before_(before) { clear(); }
+  explicit Tournament(Before before) : before_(before) {
+    makeRoom(kGroup * kGroup);  // more than a bucket of events at different times ever holds
+    clear();
+  }
 
   bool empty() const { return count_ == 0; }
 
@@ -104,7 +107,6 @@ class Tournament {
     free_places_.clear();
     top_ = 0;
     capacity_ = kGroup;
-    makeRoom();
   }
 
   std::size_t bytes() const {
@@ -122,13 +124,13 @@ class Tournament {
     std::vector<std::uint32_t> winners;  // whose these are, by place
   };
 
-  void makeRoom() {
-    if (slots_.size() >= capacity_) return;
-    slots_.resize(capacity_);
-    free_places_.reserve(capacity_);
-    for (std::size_t level = 0; level <= top_; ++level) {
-      levels_[level].times.resize(capacity_ >> (kGroupBits * level), kNever<Real>);
-      levels_[level].winners.resize(levels_[level].times.size());
+  void makeRoom(std::size_t places) {
+    if (slots_.size() >= places) return;
+    slots_.resize(places);
+    free_places_.reserve(places);
+    for (std::size_t level = 0; places >= kGroup; ++level, places >>= kGroupBits) {
+      levels_[level].times.resize(places, kNever<Real>);
+      levels_[level].winners.resize(places);
     }
     std::iota(levels_[0].winners.begin(), levels_[0].winners.end(), 0U);
   }
@@ -142,7 +144,7 @@ class Tournament {
     if (used_ == capacity_) {
       ++top_;
       capacity_ *= kGroup;
-      makeRoom();
+      makeRoom(capacity_);
       replay(0);  // the group that was the top one
     }
     return used_++;
