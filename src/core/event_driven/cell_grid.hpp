@@ -31,6 +31,7 @@
 #include "event_driven/guest_cells.hpp"
 #include "event_driven/huge_page_vector.hpp"
 #include "event_driven/pair_search.hpp"
+#include "fetch_ahead.hpp"
 
 namespace ball_sim::core {
 
@@ -105,21 +106,22 @@ class CellLevel {
 
   /// Adds the members of the 27 cells around `c`.
   void gather(const CellCoordinates& c, Candidates& candidates) const {
-    const Block<3> cells{neighbours(0, c[0]).cell, neighbours(1, c[1]).cell, neighbours(2, c[2])};
-    gatherBlock(cells, candidates);
+    gatherBlock(cellsAround(c), candidates);
   }
 
   /// The same of their layer at `direction` (-1 lower, +1 upper) of `axis` alone.
   void gatherLayer(const CellCoordinates& c, std::size_t axis, int direction,
                    Candidates& candidates) const {
-    // Not by a branch on the axis, which cannot be foretold.
-    constexpr std::array<std::uint8_t, 3> kAlong = {1, 0, 0}, kAcross = {2, 2, 1};
-    const std::size_t along = kAlong[axis], across = kAcross[axis];
-    const auto side = static_cast<unsigned>(1 + direction);
-    const Block<1> cells{neighbours(along, c[along]).cell,
-                         {neighbours(axis, c[axis]).cell[side]},
-                         neighbours(across, c[across])};
-    gatherBlock(cells, candidates);
+    gatherBlock(layerAt(c, axis, direction), candidates);
+  }
+
+  /// Fetches a cell from memory, ...
+  void fetch(const CellCoordinates& c) const { fetchAhead(&cells_[cellIndex(c)]); }
+  /// ... those that gather() looks into, ...
+  void fetchAround(const CellCoordinates& c) const { fetchBlock(cellsAround(c)); }
+  /// ... or gatherLayer().
+  void fetchLayer(const CellCoordinates& c, std::size_t axis, int direction) const {
+    fetchBlock(layerAt(c, axis, direction));
   }
 
   std::size_t bytes() const {
@@ -152,6 +154,27 @@ class CellLevel {
       }
     }
   };
+
+  Block<3> cellsAround(const CellCoordinates& c) const {
+    return {neighbours(0, c[0]).cell, neighbours(1, c[1]).cell, neighbours(2, c[2])};
+  }
+
+  Block<1> layerAt(const CellCoordinates& c, std::size_t axis, int direction) const {
+    // Not by a branch on the axis, which cannot be foretold.
+    constexpr std::array<std::uint8_t, 3> kAlong = {1, 0, 0}, kAcross = {2, 2, 1};
+    const std::size_t along = kAlong[axis], across = kAcross[axis];
+    const auto side = static_cast<unsigned>(1 + direction);
+    return {neighbours(along, c[along]).cell,
+            {neighbours(axis, c[axis]).cell[side]},
+            neighbours(across, c[across])};
+  }
+
+  template <std::size_t kRows>
+  void fetchBlock(const Block<kRows>& block) const {
+    const Cell* const cells = cells_.data();
+    block.forEach(
+        [cells](std::size_t row, std::size_t column) { fetchAhead(cells + row + column); });
+  }
 
   template <std::size_t kRows>
   void gatherBlock(const Block<kRows>& block, Candidates& candidates) const {
@@ -436,6 +459,19 @@ class CellGrid {
     } else {
       levels_[level].gatherLayer(home, axis, direction, candidates);
     }
+  }
+
+  /// Fetches the cells from memory that gatherNear() looks into, of its own level alone, ...
+  void fetchNear(const CellCoordinates& home, std::size_t level) const {
+    levels_[level].fetchAround(memberCell(home, level));
+  }
+  /// ... or move() and gatherNew(), where a ball crosses next.
+  void fetchNew(const CellCoordinates& before, std::size_t level, std::size_t axis,
+                int direction) const {
+    const CellCoordinates cell = memberCell(behind(before, level, axis, direction), level);
+    levels_[level].fetch(memberCell(before, level));
+    levels_[level].fetch(cell);
+    levels_[level].fetchLayer(cell, axis, direction);
   }
 
   std::size_t bytes() const {

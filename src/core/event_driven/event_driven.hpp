@@ -42,6 +42,7 @@
 #include "event_driven/periodic_space.hpp"
 #include "event_driven/touching_cluster.hpp"
 #include "event_driven/way_out.hpp"
+#include "fetch_ahead.hpp"
 #include "impact.hpp"
 
 namespace ball_sim::core {
@@ -241,26 +242,27 @@ class EventDriven final : public Method {
       const bool meets = !crosses && own.partner < kWall;
       const bool listed = neighbourhood_.listed();
       if (buckets_ahead == EventQueue<Real, GoesFirst>::kSoon) {
-        __builtin_prefetch(&body(slot));
-        neighbourhood_.prefetchList(slot);
+        fetchAhead(&body(slot));
+        neighbourhood_.fetchList(slot);
+        crosses ? neighbourhood_.fetchCellsToCross(own) : neighbourhood_.fetchCells(own);
         if (!meets) return;
-        __builtin_prefetch(&body(own.partner));
-        __builtin_prefetch(&agenda(own.partner));
-        neighbourhood_.prefetchList(own.partner);
+        fetchAhead(&body(own.partner));
+        fetchAhead(&agenda(own.partner));
+        neighbourhood_.fetchList(own.partner);
       } else if (crosses && listed) {
-        neighbourhood_.prefetchHomes(own);
+        neighbourhood_.fetchHomes(own);
       } else if (crosses) {
-        prefetchBodies(neighbourhood_.foreseeNewcomers(own));
+        fetchBodies(neighbourhood_.foreseeNewcomers(own));
       } else {
-        prefetchBodies(nearTo(slot));
+        fetchBodies(nearTo(slot));
         // In cells the partner's are mostly the same, and dear to find.
-        if (meets && listed) prefetchBodies(nearTo(own.partner));
+        if (meets && listed) fetchBodies(nearTo(own.partner));
       }
     };
   }
 
-  void prefetchBodies(const Near& near) const {
-    for (std::size_t i = 0; i < near.count; ++i) __builtin_prefetch(&body(near.slots[i]));
+  void fetchBodies(const Near& near) const {
+    for (std::size_t i = 0; i < near.count; ++i) fetchAhead(&body(near.slots[i]));
   }
 
   Near nearTo(Slot slot) { return neighbourhood_.near(slot, agenda(slot)); }
@@ -352,10 +354,11 @@ class EventDriven final : public Method {
     return Real(0.7) * Real(waits.size()) / *middle;
   }
 
-  // A year of about three events a ball at least.
   void setCalendar(Real events_per_second) {
+    // The turn of the year costs the less the longer the year, until its buckets fill the caches.
+    const Real events_per_ball = slots_.size() > kCachedBalls ? 1 : 3;
     std::uint32_t buckets = 8;
-    while (Real(buckets) * kEventsPerBucket < 3 * Real(slots_.size())) buckets *= 2;
+    while (Real(buckets) * kEventsPerBucket < events_per_ball * Real(slots_.size())) buckets *= 2;
     const Real width = events_per_second > 0 ? kEventsPerBucket / events_per_second : Real(1);
     // Clocks restart with the calendar.
     setClocksBack(flights_.now, kNever<Real>);

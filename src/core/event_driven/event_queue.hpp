@@ -21,6 +21,7 @@
 #include "event_driven/huge_page_vector.hpp"
 #include "event_driven/pair_search.hpp"
 #include "event_driven/tournament.hpp"
+#include "fetch_ahead.hpp"
 
 namespace ball_sim::core {
 
@@ -130,7 +131,7 @@ class EventQueue {
     // buckets, fetched some balls ahead.
     const auto last = static_cast<Slot>(agendas_.size()) - 1;
     for (Slot slot = 0; slot < agendas_.size(); ++slot) {
-      __builtin_prefetch(&heads_[bucketOf(agendas_[std::min(slot + 16, last)].due())]);
+      fetchAhead(&heads_[bucketOf(agendas_[std::min(slot + 16, last)].due())]);
       if (agendas_[slot].previous == kNotQueued) continue;
       agendas_[slot].previous = kNotQueued;
       insert(slot);
@@ -148,7 +149,7 @@ class EventQueue {
   }
 
  private:
-  static constexpr std::uint32_t kFarAhead = 4;
+  static constexpr std::uint32_t kFarAhead = 7;
   // Up to so many balls all is in the cache anyway, and to fetch ahead would only cost.
   static constexpr std::size_t kCachedBalls = 20000;
 
@@ -179,10 +180,19 @@ class EventQueue {
     heads_[current_] = kNoSlot;
   }
 
+  // Fetches the events of buckets further ahead, one more of each at every step: which is the next
+  // of a list is known only when the one before has come.
+  void followLists() const {
+    for (std::uint32_t links = 0; links < kFarAhead - kSoon; ++links) {
+      Slot slot = heads_[current_ + kFarAhead - links];
+      for (std::uint32_t i = 0; i < links && slot != kNoSlot; ++i) slot = agendas_[slot].next;
+      if (slot != kNoSlot) fetchAhead(&agendas_[slot]);
+    }
+  }
+
   template <class Expect>
   void announce(Expect expect) {
-    const Slot far = heads_[current_ + kFarAhead];
-    if (far != kNoSlot) __builtin_prefetch(&agendas_[far]);
+    followLists();
     for (const std::uint32_t ahead : {kSoon, kNext}) {
       if (current_ + ahead == buckets_) continue;  // beyond the year there is no telling when
       for (Slot s = heads_[current_ + ahead]; s != kNoSlot; s = agendas_[s].next) expect(s, ahead);

@@ -21,6 +21,7 @@
 #include "event_driven/cell_grid.hpp"
 #include "event_driven/huge_page_vector.hpp"
 #include "event_driven/pair_search.hpp"
+#include "fetch_ahead.hpp"
 #include "permutation.hpp"
 
 namespace ball_sim::core {
@@ -122,8 +123,8 @@ class NeighbourLists {
   }
 
   /// Fetches a list from memory.
-  void prefetch(Slot slot) const { __builtin_prefetch(&lists_[slot]); }
-  void prefetchHome(Slot slot) const { __builtin_prefetch(&homes_[slot]); }
+  void fetch(Slot slot) const { fetchAhead(&lists_[slot]); }
+  void fetchHome(Slot slot) const { fetchAhead(&homes_[slot]); }
 
   std::size_t bytes() const {
     return lists_.capacity() * sizeof(List) + rows_.capacity() * sizeof(Slot) +

@@ -164,13 +164,22 @@ class Neighbourhood {
 
   // --- fetching ahead from memory
 
-  void prefetchList(Slot slot) const {
-    if (listed_) lists_.prefetch(slot);
+  void fetchList(Slot slot) const {
+    if (listed_) lists_.fetch(slot);
   }
   /// The homes that a new list will be made from.
-  void prefetchHomes(const Agenda<Real>& agenda) {
+  void fetchHomes(const Agenda<Real>& agenda) {
     const Near near = inCellsAround(agenda);
-    for (std::size_t i = 0; i < near.count; ++i) lists_.prefetchHome(near.slots[i]);
+    for (std::size_t i = 0; i < near.count; ++i) lists_.fetchHome(near.slots[i]);
+  }
+  /// The cells that near() looks into, where there are no lists, ...
+  void fetchCells(const Agenda<Real>& agenda) const {
+    if (!listed_) grid_.fetchNear(agenda.cell, agenda.level);
+  }
+  /// ... and those that cross() and newcomers() will.
+  void fetchCellsToCross(const Agenda<Real>& agenda) const {
+    if (listed_) return;
+    grid_.fetchNew(agenda.cell, agenda.level, agenda.crossing_axis, agenda.crossing_direction);
   }
   /// Who will have come near by a crossing to come, on the ball's level alone.
   Near foreseeNewcomers(const Agenda<Real>& agenda) {
