@@ -208,15 +208,13 @@ struct Balls {
   /// When and where a ball, left to itself, meets its next wall.
   /// @param body  as it is, or would be
   WallVisit<Real> wallVisit(Slot slot, const Body<Real>& body) const {
+    if (isFixed(slot)) return {};
+    if constexpr (!kGravity) return straightWallVisit(body);
     WallVisit<Real> visit;
-    if (isFixed(slot)) return visit;
     for (std::size_t k = 0; k < walls.size(); ++k) {
       const Wall<Real>& wall = walls[k];
-      Real pull = 0;
-      if constexpr (kGravity) {
-        if (resting[slot].includes(static_cast<int>(k))) continue;
-        pull = dot(accelerations[slot], wall.normal);
-      }
+      if (resting[slot].includes(static_cast<int>(k))) continue;
+      const Real pull = dot(accelerations[slot], wall.normal);
       const Real gap = dot(body.x, wall.normal) - wall.offset - body.radius;
       const Real time = body.time + timeToWall<Real>(gap, dot(body.v, wall.normal), pull);
       if (time < visit.time) visit = {time, static_cast<std::uint32_t>(k)};
@@ -296,6 +294,22 @@ struct Balls {
       f(resting);
     }
     if (!walls.empty()) f(wall_visits);
+  }
+
+  // The same on a straight path: timeToWall() without branches, as which walls a ball flies to is
+  // anybody's guess.
+  WallVisit<Real> straightWallVisit(const Body<Real>& body) const {
+    WallVisit<Real> visit;
+    for (std::size_t k = 0; k < walls.size(); ++k) {
+      const Wall<Real>& wall = walls[k];
+      const Real gap = dot(body.x, wall.normal) - wall.offset - body.radius;
+      const Real approach = std::max(Real(0), -dot(body.v, wall.normal));
+      const Real time = body.time + std::max(Real(0), gap) / approach;  // inf or NaN: never
+      const bool is_sooner = time < visit.time;
+      visit.wall = is_sooner ? static_cast<std::uint32_t>(k) : visit.wall;
+      visit.time = is_sooner ? time : visit.time;
+    }
+    return visit;
   }
 
   std::uint32_t last_version_ = 0;        // given to a ball
