@@ -170,6 +170,9 @@ class SweptGrid {
     std::array<double, 3> inverse_edge{};                  // cells per unit
     std::array<Cell, 3> cells = {1, 1, 1};
     std::array<double, 3> low{}, high{};  // cells, limits to those a place may be in
+    // The same for a ball's own cell, and what takes it modulo the number of cells.
+    std::array<double, 3> home_low{}, home_high{};
+    std::array<Cell, 3> home_mask = {0, 0, 0};
     std::uint32_t first_cell = 0;
     // No ball gets further from the middle of its first path, its radius included, m.
     double reach = 0;                  // on the first paths
@@ -233,11 +236,13 @@ class SweptGrid {
     return whole - (cell < static_cast<double>(whole) ? 1 : 0);
   }
 
-  // The cell that holds a ball: in a periodic box never one of another image, not even by rounding.
-  Cell homeOf(const Level& level, std::size_t k, float x) const {
-    const Cell cell = cellOf(level, k, double(x));
-    if (axes_[k].kind != SweptAxis::Kind::periodic) return cell;
-    return std::min(std::max(cell, Cell{0}), level.cells[k] - 1);
+  // The cell that holds a ball, from 0 on: in a periodic box never one of another image, not even
+  // by rounding.
+  static Cell homeOf(const Level& level, std::size_t k, float x) {
+    const double cell = std::min(std::max(double(x) * level.inverse_edge[k], level.home_low[k]),
+                                 level.home_high[k]);
+    const auto whole = static_cast<Cell>(cell);
+    return (whole - (cell < static_cast<double>(whole) ? 1 : 0)) & level.home_mask[k];
   }
 
   // A cell modulo the number of cells, and how far away its image is.
@@ -257,10 +262,11 @@ class SweptGrid {
                : 0;
   }
 
-  std::uint32_t keyOf(const Level& level, const SweptSphere& sphere) const {
-    const Cell x = imageOfCell(homeOf(level, 0, sphere.x), level.cells[0]).cell;
-    const Cell y = imageOfCell(homeOf(level, 1, sphere.y), level.cells[1]).cell;
-    const Cell z = imageOfCell(homeOf(level, 2, sphere.z), level.cells[2]).cell;
+  __attribute__((always_inline)) static std::uint32_t keyOf(const Level& level,
+                                                            const SweptSphere& sphere) {
+    const Cell x = homeOf(level, 0, sphere.x);
+    const Cell y = homeOf(level, 1, sphere.y);
+    const Cell z = homeOf(level, 2, sphere.z);
     return level.first_cell +
            static_cast<std::uint32_t>((z * level.cells[1] + y) * level.cells[0] + x);
   }
@@ -378,21 +384,23 @@ void SweptGrid::fill(std::size_t count, const Describe& describe, WorkerPool& po
     Worker& worker = workers_[w];
     worker.ends.assign(std::size_t{cells_} + 1, 0);
     worker.radius.assign(levels_.size(), 0);
-    worker.longest = 0;
-    worker.farthest = 0;
+    double longest = 0;
+    float farthest = 0;
     for (std::size_t i = begin; i < end; ++i) {
       const SweptBall ball = describe(i);
       const SweptSphere sphere = sphereOf(ball);
       const std::size_t level = levelOf(ball.radius);
       worker.radius[level] = std::max(worker.radius[level], ball.radius);
-      worker.longest = std::max(worker.longest, ball.half_length);
-      worker.farthest = std::max(std::max(worker.farthest, std::abs(sphere.x)),
-                                 std::max(std::abs(sphere.y), std::abs(sphere.z)));
+      longest = std::max(longest, ball.half_length);
+      farthest = std::max(std::max(farthest, std::abs(sphere.x)),
+                          std::max(std::abs(sphere.y), std::abs(sphere.z)));
       lanes_.set(i, sphere);  // by slot, until all have their positions
       const std::uint32_t key = keyOf(levels_[level], sphere);
       positions_[i] = key;
       ++worker.ends[key + 1];
     }
+    worker.longest = longest;
+    worker.farthest = farthest;
   });
   sumUp();
   share(pool, count, [&](std::size_t begin, std::size_t end, unsigned w) {
