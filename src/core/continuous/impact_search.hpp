@@ -66,7 +66,7 @@ class ImpactSearch {
       Searcher<Real>& searcher = searchers_[thread];
       searcher.search.ahead_of = SweptSearch::kNoCell;  // of another frame
       inBatches(begin, end, [&](std::size_t first, std::size_t last) {
-        for (std::size_t p = first; p < last; ++p) lookAhead(p, searcher);
+        lookAhead(first, last, searcher);
         identify(searcher, [](Slot) {});
         considerPairs(searcher);
       });
@@ -199,17 +199,45 @@ class ImpactSearch {
 
  private:
   // The first pass when all are on their first paths: of a pair one looks.
-  void lookAhead(std::size_t p, Searcher<Real>& searcher) const {
+  void lookAhead(std::size_t first, std::size_t last, Searcher<Real>& searcher) const {
+    const SweptGrid& grid = frame_.grid();
+    for (std::size_t p = first; p < last; ++p) considerWall(grid.slotAt(p), searcher);
+    for (std::size_t p = first; p < last;) {
+      const std::size_t end = grid.findAhead(p, last, searcher.search);
+      noteAhead(p, searcher);
+      p = end;
+    }
+    if (grid.levels() == 1) return;
+    for (std::size_t p = first; p < last; ++p) lookInLevels(p, searcher);
+  }
+
+  // Looks for those of other levels.
+  void lookInLevels(std::size_t p, Searcher<Real>& searcher) const {
     const SweptGrid& grid = frame_.grid();
     const Slot slot = grid.slotAt(p);
-    considerWall(slot, searcher);
     const std::size_t level = grid.levelAt(p);
-    grid.findAhead(p, level, searcher.search);
-    noteHits(slot, searcher);
     for (std::size_t other = 0; other < grid.levels(); ++other) {
       if (!grid.seeks(level, other)) continue;
       grid.findAround(other, frame_.inGrid(balls_.pathOf(slot)), searcher.search);
       noteHits(slot, searcher);
+    }
+  }
+
+  // Notes where the balls from `first` on have found others, and asks memory who they are.
+  void noteAhead(std::size_t first, Searcher<Real>& searcher) const {
+    const SweptGrid& grid = frame_.grid();
+    const SweptSearch& search = searcher.search;
+    const BlockHits& hits = search.ahead_hits;
+    const std::size_t before = searcher.pairs.size();
+    searcher.pairs.resize(before + hits.count);
+    for (std::size_t i = 0; i < hits.count; ++i) {
+      const std::uint32_t lane = search.ahead.origins[hits.lanes[i]];
+      grid.fetchSlot(lane);
+      searcher.pairs[before + i] = {grid.slotAt(first + hits.spheres[i]), lane, {0, 0, 0}};
+    }
+    if (frame_.oneImageIsNear()) return;
+    for (std::size_t i = 0; i < hits.count; ++i) {
+      searcher.pairs[before + i].turns = grid.imageOf(search.runOf(hits.lanes[i]));
     }
   }
 
@@ -221,7 +249,8 @@ class ImpactSearch {
       const LaneHit& hit = searcher.search.hits[i];
       grid.fetchSlot(hit.lane);
       searcher.pairs.push_back({slot, hit.lane, {0, 0, 0}});
-      if (!one_image_is_near) searcher.pairs.back().turns = grid.imageOf(hit, searcher.search);
+      if (!one_image_is_near)
+        searcher.pairs.back().turns = grid.imageOf(searcher.search.runs[hit.run]);
     }
   }
 

@@ -258,17 +258,35 @@ void SweptGrid::findInBox(const Level& level, const SweptBall& ball, double reac
   run(sphere, search);
 }
 
-void SweptGrid::findAhead(std::size_t position, std::size_t level, SweptSearch& search) const {
-  const Level& own = levels_[level];
-  search.cell = cellAt(position, search.cell);
-  if (search.cell != search.ahead_of) runsAhead(search.cell, own, search);
-  if (own.has_ahead) search.runs.front().begin = static_cast<std::uint32_t>(position) + 1;
-  run(first_[position], search);
-  if (own.has_ahead) return;
-  const auto behind = [position](const LaneHit& hit) { return hit.lane <= position; };
-  const auto end = std::remove_if(
-      search.hits.begin(), search.hits.begin() + static_cast<std::ptrdiff_t>(search.count), behind);
-  search.count = static_cast<std::size_t>(end - search.hits.begin());
+std::size_t SweptGrid::findAhead(std::size_t first, std::size_t last, SweptSearch& search) const {
+  const Level& level = levels_[levelAt(first)];
+  search.cell = cellAt(first, search.cell);
+  if (search.cell != search.ahead_of) {
+    runsAhead(search.cell, level, search);
+    gatherRuns(lanes_, search.runs.data(), search.run_count, search.ahead);
+  }
+  const std::size_t begin = begins()[search.cell];
+  const std::size_t end = std::min(last, std::size_t{begins()[search.cell + 1]});
+  const SweptSphere* const spheres = first_.data() + first;
+  BlockHits& hits = search.ahead_hits;
+  if (level.has_ahead) {  // the block begins with this cell
+    findInBlock(search.ahead, spheres, end - first, first - begin + 1, 1, hits);
+  } else {
+    findInBlock(search.ahead, spheres, end - first, 0, 0, hits);
+    dropBehind(first, search);
+  }
+  return end;
+}
+
+void SweptGrid::dropBehind(std::size_t first, SweptSearch& search) {
+  BlockHits& hits = search.ahead_hits;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < hits.count; ++i) {
+    if (search.ahead.origins[hits.lanes[i]] <= first + hits.spheres[i]) continue;
+    hits.spheres[kept] = hits.spheres[i];
+    hits.lanes[kept++] = hits.lanes[i];
+  }
+  hits.count = kept;
 }
 
 // Ahead is: the rest of the own row, then the rows that follow; or everywhere, where a search may
@@ -302,9 +320,7 @@ SweptGrid::Range SweptGrid::nearOf(const Level& level, std::size_t k, Cell cell)
   return range;
 }
 
-std::array<std::int16_t, 3> SweptGrid::imageOf(const LaneHit& hit,
-                                               const SweptSearch& search) const {
-  const LaneRun& run = search.runs[hit.run];
+std::array<std::int16_t, 3> SweptGrid::imageOf(const LaneRun& run) const {
   const std::array<float, 3> shift = {run.sx, run.sy, run.sz};
   std::array<std::int16_t, 3> image = {0, 0, 0};
   for (std::size_t k = 0; k < 3; ++k) {

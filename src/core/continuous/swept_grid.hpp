@@ -53,9 +53,21 @@ struct SweptSearch {
   std::vector<LaneHit> hits;
   std::size_t count = 0;             ///< of the hits
   std::uint32_t cell = 0;            ///< where findAhead() was last
-  std::uint32_t ahead_of = kNoCell;  ///< the runs are those ahead of the balls of this cell
+  std::uint32_t ahead_of = kNoCell;  ///< the block is what lies ahead of the balls of this cell
+  LaneBlock ahead;
+  BlockHits ahead_hits;
 
   static constexpr std::uint32_t kNoCell = ~std::uint32_t{0};
+
+  /// Where a lane of the block comes from.
+  const LaneRun& runOf(std::uint32_t block_lane) const {
+    std::size_t k = 0;
+    while (block_lane >= runs[k].end - runs[k].begin) {
+      block_lane -= runs[k].end - runs[k].begin;
+      ++k;
+    }
+    return runs[k];
+  }
 };
 
 /// Finds who may meet whom within one frame: fill it when the frame begins, search, and tell it of
@@ -114,8 +126,9 @@ class SweptGrid {
             unit_ * double(sphere.z) + axes_[2].origin};
   }
 
-  /// So many periods along each axis lies the image that was hit from the one that middleAt tells.
-  std::array<std::int16_t, 3> imageOf(const LaneHit& hit, const SweptSearch& search) const;
+  /// So many periods along each axis lies the image that a run shows from the one that middleAt
+  /// tells.
+  std::array<std::int16_t, 3> imageOf(const LaneRun& run) const;
 
   /// Fetches from memory what change() or add() of a ball needs.
   void fetch(std::size_t p) const {
@@ -140,10 +153,12 @@ class SweptGrid {
     return reach;
   }
 
-  /// Finds the balls of the same level that may meet the ball at `position` in this frame, each
-  /// pair from one of its ends only. All balls are on their first paths. Quick for one position
-  /// after the other: `search` still knows where to look for those of the same cell.
-  void findAhead(std::size_t position, std::size_t level, SweptSearch& search) const;
+  /// Finds the balls of the same level that some balls may meet in this frame, each pair from one
+  /// of its ends only. All balls are on their first paths.
+  /// @param first, last  positions of the balls to look from; done are the first ones, of one cell
+  /// @param search       takes the hits in `ahead_hits`: sphere k is the ball at first + k
+  /// @return the first position that is not done
+  std::size_t findAhead(std::size_t first, std::size_t last, SweptSearch& search) const;
 
   /// Finds all balls of a level that may meet a ball, as long as all are on their first paths.
   void findAround(std::size_t level, const SweptBall& ball, SweptSearch& search) const {
@@ -195,6 +210,9 @@ class SweptGrid {
   struct Range {
     Cell first, last;
   };
+
+  // Share of a distance by which tests in single precision may falsify it: 8 roundings.
+  static constexpr float kSlack = 5e-7F;
 
   static constexpr int kBins = 256;  // octaves of radius, 2^-128 .. 2^127 m
 
@@ -280,7 +298,7 @@ class SweptGrid {
   __attribute__((always_inline)) SweptSphere sphereOf(const SweptBall& ball) const {
     return {inUnits(ball.middle[0] - axes_[0].origin), inUnits(ball.middle[1] - axes_[1].origin),
             inUnits(ball.middle[2] - axes_[2].origin),
-            inUnits(ball.radius + ball.half_length) + margin_};
+            inUnits(ball.radius + ball.half_length) * (1 + kSlack) + margin_};
   }
 
   // Within single precision, whatever is asked.
@@ -313,6 +331,7 @@ class SweptGrid {
     while (position >= begins[before + 1]) ++before;
     return before;
   }
+  static void dropBehind(std::size_t first, SweptSearch& search);
   void runsAhead(std::uint32_t key, const Level& level, SweptSearch& search) const;
   Range nearOf(const Level& level, std::size_t k, Cell cell) const;
 

@@ -16,28 +16,33 @@
 namespace ball_sim::core {
 namespace {
 
-// Share of squares by which single precision may falsify sums of three: 16 roundings.
-constexpr float kSlack = 1e-6F;
-
-// As many lanes as most runs are long; narrower instructions take them in parts.
-constexpr std::uint32_t kLanes = SweptLanes::kWidth;
-typedef float Floats __attribute__((vector_size(4 * kLanes)));        // NOLINT(modernize-use-using)
-typedef std::int32_t Flags __attribute__((vector_size(4 * kLanes)));  // NOLINT(modernize-use-using)
+// Notes hits that come as bits; each set of instructions does so in a loop, or at once.
+inline __attribute__((always_inline)) void appendEach(unsigned bits, std::uint32_t sphere,
+                                                      std::uint32_t begin, std::uint32_t* spheres,
+                                                      std::uint32_t* lanes) {
+  for (; bits != 0; bits &= bits - 1) {
+    *spheres++ = sphere;
+    *lanes++ = begin + static_cast<unsigned>(__builtin_ctz(bits));
+  }
+}
 
 namespace plain {
-inline __attribute__((always_inline)) unsigned bitsOf(const Flags& flags) {
-  unsigned bits = 0;
-#if defined(__x86_64__)
-  for (unsigned i = 0; i < kLanes / 4; ++i) {
-    __m128 part;
-    std::memcpy(&part, reinterpret_cast<const char*>(&flags) + 16 * i, 16);
-    bits |= static_cast<unsigned>(_mm_movemask_ps(part)) << (4 * i);
-  }
-#else
-  for (unsigned i = 0; i < kLanes; ++i) bits |= (flags[i] & 1U) << i;
-#endif
-  return bits;
+typedef float Floats __attribute__((vector_size(16)));  // NOLINT(modernize-use-using)
+
+inline __attribute__((always_inline)) Floats multiplyAdd(Floats a, Floats b, Floats c) {
+  return a * b + c;
 }
+
+inline __attribute__((always_inline)) unsigned bitsOfGreater(Floats a, Floats b) {
+#if defined(__x86_64__)
+  return static_cast<unsigned>(_mm_movemask_ps(_mm_cmpgt_ps(a, b)));
+#else
+  const auto flags = a > b;
+  return (flags[0] & 1U) | (flags[1] & 2U) | (flags[2] & 4U) | (flags[3] & 8U);
+#endif
+}
+
+constexpr auto append = appendEach;
 
 #include "continuous/swept_lanes_kernel.inc"
 }  // namespace plain
@@ -46,27 +51,45 @@ inline __attribute__((always_inline)) unsigned bitsOf(const Flags& flags) {
 #define BALL_SIM_WIDER
 
 #pragma GCC push_options
-#pragma GCC target("avx2")
+#pragma GCC target("avx2,fma,popcnt")
 namespace avx2 {
-inline __attribute__((always_inline)) unsigned bitsOf(const Flags& flags) {
-  unsigned bits = 0;
-  for (unsigned i = 0; i < kLanes / 8; ++i) {
-    __m256 part;
-    std::memcpy(&part, reinterpret_cast<const char*>(&flags) + 32 * i, 32);
-    bits |= static_cast<unsigned>(_mm256_movemask_ps(part)) << (8 * i);
-  }
-  return bits;
+typedef float Floats __attribute__((vector_size(32)));  // NOLINT(modernize-use-using)
+
+inline __attribute__((always_inline)) Floats multiplyAdd(Floats a, Floats b, Floats c) {
+  return _mm256_fmadd_ps(a, b, c);
 }
+
+inline __attribute__((always_inline)) unsigned bitsOfGreater(Floats a, Floats b) {
+  return static_cast<unsigned>(_mm256_movemask_ps(_mm256_cmp_ps(a, b, _CMP_GT_OQ)));
+}
+
+constexpr auto append = appendEach;
 
 #include "continuous/swept_lanes_kernel.inc"
 }  // namespace avx2
 #pragma GCC pop_options
 
 #pragma GCC push_options
-#pragma GCC target("avx512f,avx512dq")
+#pragma GCC target("avx512f,popcnt")
 namespace avx512 {
-inline __attribute__((always_inline)) unsigned bitsOf(const Flags& flags) {
-  return static_cast<unsigned>(_mm512_movepi32_mask((__m512i)flags));  // NOLINT: the bits
+typedef float Floats __attribute__((vector_size(64)));  // NOLINT(modernize-use-using)
+
+inline __attribute__((always_inline)) Floats multiplyAdd(Floats a, Floats b, Floats c) {
+  return _mm512_fmadd_ps(a, b, c);
+}
+
+inline __attribute__((always_inline)) unsigned bitsOfGreater(Floats a, Floats b) {
+  return _mm512_cmp_ps_mask(a, b, _CMP_GT_OQ);
+}
+
+inline __attribute__((always_inline)) void append(unsigned bits, std::uint32_t sphere,
+                                                  std::uint32_t begin, std::uint32_t* spheres,
+                                                  std::uint32_t* lanes) {
+  const __m512i steps = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+  const __m512i all = _mm512_add_epi32(_mm512_set1_epi32(static_cast<int>(begin)), steps);
+  const auto mask = static_cast<__mmask16>(bits);
+  _mm512_storeu_si512(lanes, _mm512_maskz_compress_epi32(mask, all));
+  _mm512_storeu_si512(spheres, _mm512_set1_epi32(static_cast<int>(sphere)));
 }
 
 #include "continuous/swept_lanes_kernel.inc"
@@ -74,27 +97,52 @@ inline __attribute__((always_inline)) unsigned bitsOf(const Flags& flags) {
 #pragma GCC pop_options
 #endif
 
-using Find = std::size_t (*)(const SweptLanes&, const SweptSphere&, const LaneRun*, std::size_t,
-                             LaneHit*);
+struct Kernels {
+  decltype(&plain::findInRuns) find_in_runs;
+  decltype(&plain::gather) gather;
+  decltype(&plain::findInBlock) find_in_block;
+};
 
 // The widest version that the processor can run.
-Find widest() {
+Kernels widest() {
 #if defined(BALL_SIM_WIDER)
   __builtin_cpu_init();
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq")) {
-    return avx512::findInRuns;
+  const bool counts = __builtin_cpu_supports("popcnt");
+  if (counts && __builtin_cpu_supports("avx512f")) {
+    return {avx512::findInRuns, avx512::gather, avx512::findInBlock};
   }
-  if (__builtin_cpu_supports("avx2")) return avx2::findInRuns;
+  if (counts && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
+    return {avx2::findInRuns, avx2::gather, avx2::findInBlock};
+  }
 #endif
-  return plain::findInRuns;
+  return {plain::findInRuns, plain::gather, plain::findInBlock};
+}
+
+const Kernels& kernels() {
+  static const Kernels kWidest = widest();
+  return kWidest;
 }
 
 }  // namespace
 
 std::size_t findOverlaps(const SweptLanes& lanes, const SweptSphere& sphere, const LaneRun* runs,
                          std::size_t count, LaneHit* hits) {
-  static const Find kFind = widest();
-  return kFind(lanes, sphere, runs, count, hits);
+  return kernels().find_in_runs(lanes, sphere, runs, count, hits);
+}
+
+void gatherRuns(const SweptLanes& lanes, const LaneRun* runs, std::size_t count, LaneBlock& block) {
+  block.count = 0;
+  for (std::size_t k = 0; k < count; ++k) block.count += runs[k].end - runs[k].begin;
+  if (block.lanes.x.size() < block.count + 2 * SweptLanes::kWidth) {
+    block.lanes.resize(2 * block.count + SweptLanes::kWidth);
+    block.origins.resize(block.lanes.x.size());
+  }
+  kernels().gather(lanes, runs, count, block);
+}
+
+void findInBlock(const LaneBlock& block, const SweptSphere* spheres, std::size_t count,
+                 std::size_t begin, std::size_t step, BlockHits& hits) {
+  kernels().find_in_block(block, spheres, count, begin, step, hits);
 }
 
 }  // namespace ball_sim::core

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "event_driven/huge_page_vector.hpp"
 
@@ -53,10 +54,39 @@ struct LaneHit {
   std::uint32_t run;  ///< index of the run it was found in
 };
 
+/// The lanes of some runs, copied side by side, each in the image that is meant.
+struct LaneBlock {
+  SweptLanes lanes;
+  HugePageVector<std::uint32_t> origins;  ///< which lanes they are copies of
+  std::size_t count = 0;
+};
+
+/// Who overlaps whom: a block's lanes and spheres that were looked for.
+struct BlockHits {
+  std::vector<std::uint32_t> spheres;  ///< their numbers; as below, has room for more
+  std::vector<std::uint32_t> lanes;    ///< of the block
+  std::size_t count = 0;
+
+  void makeRoom(std::size_t size) {
+    if (lanes.size() >= size) return;
+    spheres.resize(2 * size);
+    lanes.resize(2 * size);
+  }
+};
+
 /// Finds the lanes that overlap a sphere.
 /// @param hits  room for all lanes of all runs
 /// @return number of hits
 std::size_t findOverlaps(const SweptLanes& lanes, const SweptSphere& sphere, const LaneRun* runs,
                          std::size_t count, LaneHit* hits);
+
+/// Copies runs into a block.
+void gatherRuns(const SweptLanes& lanes, const LaneRun* runs, std::size_t count, LaneBlock& block);
+
+/// Finds what some spheres overlap in a block.
+/// @param begin, step  sphere k is looked for from lane `begin + k * step` on
+/// @param hits         are set, sphere after sphere
+void findInBlock(const LaneBlock& block, const SweptSphere* spheres, std::size_t count,
+                 std::size_t begin, std::size_t step, BlockHits& hits);
 
 }  // namespace ball_sim::core
