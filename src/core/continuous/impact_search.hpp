@@ -92,7 +92,7 @@ class ImpactSearch {
   void lookAround(Slot slot, const SweptBall& rest, Searcher<Real>& searcher) const {
     const SweptGrid& grid = frame_.grid();
     for (std::size_t level = 0; level < grid.levels(); ++level) {
-      grid.findAroundLater(level, rest, searcher.search);
+      grid.findAround(level, rest, searcher.search);
       noteHits(slot, searcher);
     }
   }

@@ -162,7 +162,8 @@ void SweptGrid::sumUp() {
     double radius = 0;
     for (const Worker& worker : workers_) radius = std::max(radius, worker.radius[i]);
     levels_[i].reach = radius + longest_;
-    levels_[i].reach_later = radius + kMoreWay * 2 * longest_;
+    levels_[i].reach_later = levels_[i].reach;
+    levels_[i].farthest = radius + kMoreWay * 2 * longest_;
     setNear(levels_[i]);
   }
 }
@@ -170,7 +171,7 @@ void SweptGrid::sumUp() {
 void SweptGrid::setNear(Level& level) const {
   const double first = 2 * (level.reach / unit_ + double(margin_));
   // To each side a path, which is within reach of its middle, and the reach of what it may meet.
-  const double widest = 4 * (level.reach_later / unit_ + double(margin_));
+  const double widest = 4 * (level.farthest / unit_ + double(margin_));
   level.has_ahead = true;
   for (std::size_t k = 0; k < 3; ++k) {
     const double cells = std::min(std::ceil(first * level.inverse_edge[k]), kFarthestCell / 4);
@@ -248,12 +249,12 @@ void SweptGrid::run(const SweptSphere& sphere, SweptSearch& search) const {
       findOverlaps(lanes_, sphere, search.runs.data(), search.run_count, search.hits.data());
 }
 
-void SweptGrid::findInBox(const Level& level, const SweptBall& ball, double reach,
-                          SweptSearch& search) const {
+void SweptGrid::findAround(std::size_t index, const SweptBall& ball, SweptSearch& search) const {
+  const Level& level = levels_[index];
   search.run_count = search.lane_count = 0;
   search.ahead_of = SweptSearch::kNoCell;
   const SweptSphere sphere = sphereOf(ball);
-  const std::array<Range, 3> box = boxAround(level, sphere, ball, reach);
+  const std::array<Range, 3> box = boxAround(level, sphere, ball, level.reach_later.value());
   for (Cell z = box[2].first; z <= box[2].last; ++z) addRows(level, z, box[1], box[0], search);
   run(sphere, search);
 }
@@ -330,14 +331,19 @@ std::array<std::int16_t, 3> SweptGrid::imageOf(const LaneRun& run) const {
   return image;
 }
 
-// Whether searches would find it, given where the ball began the frame.
-bool SweptGrid::staysNear(std::size_t p, const SweptSphere& sphere) const {
+// Lets searches reach as far as a path leads, given where the ball began the frame, unless that is
+// too far.
+bool SweptGrid::staysNear(std::size_t p, const SweptSphere& sphere) {
   const SweptSphere& first = first_[p];
   const double x = double(sphere.x - first.x), y = double(sphere.y - first.y),
                z = double(sphere.z - first.z);
   // Of the two margins that searches add, one is in the sphere's radius already.
-  const double limit = levels_[levelAt(p)].reach_later * per_unit_ + 1.5 * double(margin_);
-  return std::sqrt(x * x + y * y + z * z) + double(sphere.r) <= limit;
+  const double reach =
+      (std::sqrt(x * x + y * y + z * z) + double(sphere.r) - 1.5 * double(margin_)) * unit_;
+  Level& level = levels_[levelAt(p)];
+  if (!(reach <= level.farthest)) return false;
+  level.reach_later.note(reach);
+  return true;
 }
 
 bool SweptGrid::change(std::size_t p, const SweptBall& ball) {

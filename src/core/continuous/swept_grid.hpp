@@ -17,6 +17,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -43,6 +44,28 @@ struct SweptBall {
   std::array<double, 3> half;    ///< m, from the middle to the end, with its sign
   double radius;                 ///< m, with what the path may lie beside a straight one
   double half_length;            ///< m, length of `half`
+};
+
+/// The largest of what threads tell.
+class SharedMaximum {
+ public:
+  SharedMaximum() = default;
+  SharedMaximum(const SharedMaximum& other) : value_(other.value()) {}
+  SharedMaximum& operator=(double value) {
+    value_.store(value, std::memory_order_relaxed);
+    return *this;
+  }
+
+  double value() const { return value_.load(std::memory_order_relaxed); }
+
+  void note(double value) {
+    double most = this->value();
+    while (value > most && !value_.compare_exchange_weak(most, value, std::memory_order_relaxed)) {
+    }
+  }
+
+ private:
+  std::atomic<double> value_{0};
 };
 
 /// What one search needs, kept so that nothing is allocated.
@@ -149,7 +172,7 @@ class SweptGrid {
   /// How far from the middle of its first path a ball may touch something, at most, m.
   double reach() const {
     double reach = 0;
-    for (const Level& level : levels_) reach = std::max(reach, level.reach_later);
+    for (const Level& level : levels_) reach = std::max(reach, level.farthest);
     return reach;
   }
 
@@ -160,15 +183,8 @@ class SweptGrid {
   /// @return the first position that is not done
   std::size_t findAhead(std::size_t first, std::size_t last, SweptSearch& search) const;
 
-  /// Finds all balls of a level that may meet a ball, as long as all are on their first paths.
-  void findAround(std::size_t level, const SweptBall& ball, SweptSearch& search) const {
-    findInBox(levels_[level], ball, levels_[level].reach, search);
-  }
-
-  /// Finds all balls of a level that may meet a ball.
-  void findAroundLater(std::size_t level, const SweptBall& ball, SweptSearch& search) const {
-    findInBox(levels_[level], ball, levels_[level].reach_later, search);
-  }
+  /// Finds all balls of a level that may meet a ball, by how far balls of the level have got.
+  void findAround(std::size_t level, const SweptBall& ball, SweptSearch& search) const;
 
   std::size_t bytes() const {
     std::size_t bytes = lanes_.bytes() + (slots_.capacity() + positions_.capacity()) * 4 +
@@ -191,7 +207,8 @@ class SweptGrid {
     std::uint32_t first_cell = 0;
     // No ball gets further from the middle of its first path, its radius included, m.
     double reach = 0;                  // on the first paths
-    double reach_later = 0;            // on those that follow
+    SharedMaximum reach_later;         // on those too that have followed until now
+    double farthest = 0;               // on any: a limit
     std::uint32_t begin = 0, end = 0;  // positions
     std::array<Cell, 3> near{};        // balls on first paths meet none in cells further away
     bool has_ahead = true;             // no search reaches around an open axis
@@ -308,13 +325,11 @@ class SweptGrid {
 
   std::array<Range, 3> boxAround(const Level& level, const SweptSphere& sphere,
                                  const SweptBall& ball, double reach) const;
-  void findInBox(const Level& level, const SweptBall& ball, double reach,
-                 SweptSearch& search) const;
   void addRows(const Level& level, Cell z, Range y, Range x, SweptSearch& search) const;
   void addWrapped(const Level& level, const std::uint32_t* begins, Range x, float sy, float sz,
                   SweptSearch& search) const;
   void run(const SweptSphere& sphere, SweptSearch& search) const;
-  bool staysNear(std::size_t p, const SweptSphere& sphere) const;
+  bool staysNear(std::size_t p, const SweptSphere& sphere);
 
   // --- filling
 
