@@ -227,13 +227,13 @@ class ImpactSearch {
   void noteAhead(std::size_t first, Searcher<Real>& searcher) const {
     const SweptGrid& grid = frame_.grid();
     const SweptSearch& search = searcher.search;
-    const BlockHits& hits = search.ahead_hits;
+    const LaneHits& hits = search.hits;
     const std::size_t before = searcher.pairs.size();
     searcher.pairs.resize(before + hits.count);
     for (std::size_t i = 0; i < hits.count; ++i) {
       const std::uint32_t lane = search.ahead.origins[hits.lanes[i]];
       grid.fetchSlot(lane);
-      searcher.pairs[before + i] = {grid.slotAt(first + hits.spheres[i]), lane, {0, 0, 0}};
+      searcher.pairs[before + i] = {grid.slotAt(first + hits.sources[i]), lane, {0, 0, 0}};
     }
     if (frame_.oneImageIsNear()) return;
     for (std::size_t i = 0; i < hits.count; ++i) {
@@ -244,13 +244,17 @@ class ImpactSearch {
   // Notes where a search has found others, and asks memory who they are.
   void noteHits(Slot slot, Searcher<Real>& searcher) const {
     const SweptGrid& grid = frame_.grid();
-    const bool one_image_is_near = frame_.oneImageIsNear();
-    for (std::size_t i = 0; i < searcher.search.count; ++i) {
-      const LaneHit& hit = searcher.search.hits[i];
-      grid.fetchSlot(hit.lane);
-      searcher.pairs.push_back({slot, hit.lane, {0, 0, 0}});
-      if (!one_image_is_near)
-        searcher.pairs.back().turns = grid.imageOf(searcher.search.runs[hit.run]);
+    const SweptSearch& search = searcher.search;
+    const LaneHits& hits = search.hits;
+    const std::size_t before = searcher.pairs.size();
+    searcher.pairs.resize(before + hits.count);
+    for (std::size_t i = 0; i < hits.count; ++i) {
+      grid.fetchSlot(hits.lanes[i]);
+      searcher.pairs[before + i] = {slot, hits.lanes[i], {0, 0, 0}};
+    }
+    if (frame_.oneImageIsNear()) return;
+    for (std::size_t i = 0; i < hits.count; ++i) {
+      searcher.pairs[before + i].turns = grid.imageOf(search.runs[hits.sources[i]]);
     }
   }
 

@@ -182,48 +182,50 @@ void SweptGrid::setNear(Level& level) const {
   }
 }
 
-std::array<SweptGrid::Range, 3> SweptGrid::boxAround(const Level& level, const SweptSphere& sphere,
-                                                     const SweptBall& ball, double reach) const {
-  const std::array<float, 3> middle = {sphere.x, sphere.y, sphere.z};
+SweptGrid::CellBox SweptGrid::boxAround(const Level& level, const SweptSphere& sphere,
+                                        const SweptBall& ball, double reach) const {
   const double around = (ball.radius + reach) * per_unit_ + 2 * double(margin_);
-  std::array<Range, 3> box{};
-  for (std::size_t k = 0; k < 3; ++k) {
+  const auto along = [&](std::size_t k, double middle) -> Range {
     const double half = std::abs(ball.half[k]) * per_unit_ + around;
-    box[k] = {cellOf(level, k, double(middle[k]) - half),
-              cellOf(level, k, double(middle[k]) + half)};
+    const Range range = {cellOf(level, k, middle - half), cellOf(level, k, middle + half)};
     const Cell last = level.cells[k] - 1;
-    if (box[k].last - box[k].first >= last && axes_[k].kind == SweptAxis::Kind::open) {
-      box[k] = {0, last};
-    }
-  }
-  return box;
+    const bool all = range.last - range.first >= last && axes_[k].kind == SweptAxis::Kind::open;
+    return all ? Range{0, last} : range;
+  };
+  return {along(0, double(sphere.x)), along(1, double(sphere.y)), along(2, double(sphere.z))};
 }
 
-// Rows of cells beside each other; most often no axis is wrapped around.
-void SweptGrid::addRows(const Level& level, Cell z, Range y, Range x, SweptSearch& search) const {
-  const Image iz = imageOfCell(z, level.cells[2]);
-  const bool plain = iz.turns == 0 && y.first >= 0 && y.last < level.cells[1] && x.first >= 0 &&
-                     x.last < level.cells[0];
-  const std::uint32_t* layer =
-      begins() + level.first_cell +
-      static_cast<std::size_t>(iz.cell) * static_cast<std::size_t>(level.cells[1] * level.cells[0]);
-  if (!plain) {
-    for (Cell row = y.first; row <= y.last; ++row) {
-      const Image iy = imageOfCell(row, level.cells[1]);
-      addWrapped(level, layer + iy.cell * level.cells[0], x, shiftOf(1, iy.turns),
-                 shiftOf(2, iz.turns), search);
+// Rows of cells; most often no axis is wrapped around.
+void SweptGrid::addBox(const Level& level, const CellBox& box, SweptSearch& search) const {
+  const auto& [x, y, z] = box;
+  const std::array<Cell, 3>& cells = level.cells;
+  const std::uint32_t* const all = begins() + level.first_cell;
+  if (x.first < 0 || y.first < 0 || z.first < 0 || x.last >= cells[0] || y.last >= cells[1] ||
+      z.last >= cells[2]) {
+    for (Cell layer = z.first; layer <= z.last; ++layer) {
+      const Image iz = imageOfCell(layer, cells[2]);
+      for (Cell row = y.first; row <= y.last; ++row) {
+        const Image iy = imageOfCell(row, cells[1]);
+        addWrapped(level, all + (iz.cell * cells[1] + iy.cell) * cells[0], x, shiftOf(1, iy.turns),
+                   shiftOf(2, iz.turns), search);
+      }
     }
     return;
   }
-  const std::size_t most = search.run_count + static_cast<std::size_t>(y.last - y.first + 1);
-  if (search.runs.size() < most) search.runs.resize(2 * most);
-  for (Cell row = y.first; row <= y.last; ++row) {
-    const std::uint32_t* begins = layer + row * level.cells[0];
-    const LaneRun run = {begins[x.first], begins[x.last + 1], 0, 0, 0};
-    search.runs[search.run_count] = run;
-    search.run_count += run.begin < run.end ? 1 : 0;
-    search.lane_count += run.end - run.begin;
+  search.makeRoom(static_cast<std::size_t>((z.last - z.first + 1) * (y.last - y.first + 1)));
+  LaneRun* next = search.runs.data() + search.run_count;
+  const Cell width = x.last - x.first + 1;
+  std::size_t lanes = 0;
+  for (Cell layer = z.first; layer <= z.last; ++layer) {
+    const std::uint32_t* row = all + (layer * cells[1] + y.first) * cells[0] + x.first;
+    for (Cell k = y.first; k <= y.last; ++k, row += cells[0]) {
+      *next = {row[0], row[width], 0, 0, 0};
+      lanes += row[width] - row[0];
+      next += row[0] < row[width] ? 1 : 0;
+    }
   }
+  search.run_count = static_cast<std::size_t>(next - search.runs.data());
+  search.lane_count += lanes;
 }
 
 // The cells of a row as they go on from image to image.
@@ -235,7 +237,7 @@ void SweptGrid::addWrapped(const Level& level, const std::uint32_t* begins, Rang
     const Cell last = std::min(x.last, image.turns * count + count - 1);
     const LaneRun run = {begins[image.cell], begins[last - image.turns * count + 1],
                          shiftOf(0, image.turns), sy, sz};
-    if (search.runs.size() <= search.run_count) search.runs.resize(2 * search.run_count + 64);
+    search.makeRoom(1);
     search.runs[search.run_count] = run;
     search.run_count += run.begin < run.end ? 1 : 0;
     search.lane_count += run.end - run.begin;
@@ -243,20 +245,14 @@ void SweptGrid::addWrapped(const Level& level, const std::uint32_t* begins, Rang
   }
 }
 
-void SweptGrid::run(const SweptSphere& sphere, SweptSearch& search) const {
-  if (search.hits.size() < search.lane_count) search.hits.resize(2 * search.lane_count);
-  search.count =
-      findOverlaps(lanes_, sphere, search.runs.data(), search.run_count, search.hits.data());
-}
-
 void SweptGrid::findAround(std::size_t index, const SweptBall& ball, SweptSearch& search) const {
   const Level& level = levels_[index];
   search.run_count = search.lane_count = 0;
   search.ahead_of = SweptSearch::kNoCell;
   const SweptSphere sphere = sphereOf(ball);
-  const std::array<Range, 3> box = boxAround(level, sphere, ball, level.reach_later.value());
-  for (Cell z = box[2].first; z <= box[2].last; ++z) addRows(level, z, box[1], box[0], search);
-  run(sphere, search);
+  addBox(level, boxAround(level, sphere, ball, level.reach_later.value()), search);
+  search.hits.makeRoom(search.lane_count + SweptLanes::kWidth);
+  findInRuns(lanes_, sphere, search.runs.data(), search.run_count, search.hits);
 }
 
 std::size_t SweptGrid::findAhead(std::size_t first, std::size_t last, SweptSearch& search) const {
@@ -269,7 +265,7 @@ std::size_t SweptGrid::findAhead(std::size_t first, std::size_t last, SweptSearc
   const std::size_t begin = begins()[search.cell];
   const std::size_t end = std::min(last, std::size_t{begins()[search.cell + 1]});
   const SweptSphere* const spheres = first_.data() + first;
-  BlockHits& hits = search.ahead_hits;
+  LaneHits& hits = search.hits;
   if (level.has_ahead) {  // the block begins with this cell
     findInBlock(search.ahead, spheres, end - first, first - begin + 1, 1, hits);
   } else {
@@ -280,11 +276,11 @@ std::size_t SweptGrid::findAhead(std::size_t first, std::size_t last, SweptSearc
 }
 
 void SweptGrid::dropBehind(std::size_t first, SweptSearch& search) {
-  BlockHits& hits = search.ahead_hits;
+  LaneHits& hits = search.hits;
   std::size_t kept = 0;
   for (std::size_t i = 0; i < hits.count; ++i) {
-    if (search.ahead.origins[hits.lanes[i]] <= first + hits.spheres[i]) continue;
-    hits.spheres[kept] = hits.spheres[i];
+    if (search.ahead.origins[hits.lanes[i]] <= first + hits.sources[i]) continue;
+    hits.sources[kept] = hits.sources[i];
     hits.lanes[kept++] = hits.lanes[i];
   }
   hits.count = kept;
@@ -303,11 +299,11 @@ void SweptGrid::runsAhead(std::uint32_t key, const Level& level, SweptSearch& se
   const Range along_y = nearOf(level, 1, y);
   const Range along_z = nearOf(level, 2, z);
   if (level.has_ahead) {
-    addRows(level, z, {y, y}, {x, along_x.last}, search);
-    addRows(level, z, {y + 1, along_y.last}, along_x, search);
-  }
-  for (Cell layer = level.has_ahead ? z + 1 : along_z.first; layer <= along_z.last; ++layer) {
-    addRows(level, layer, along_y, along_x, search);
+    addBox(level, {{x, along_x.last}, {y, y}, {z, z}}, search);
+    addBox(level, {along_x, {y + 1, along_y.last}, {z, z}}, search);
+    addBox(level, {along_x, along_y, {z + 1, along_z.last}}, search);
+  } else {
+    addBox(level, {along_x, along_y, along_z}, search);
   }
 }
 

@@ -73,14 +73,16 @@ struct SweptSearch {
   std::vector<LaneRun> runs;
   std::size_t run_count = 0;
   std::size_t lane_count = 0;  ///< of all runs
-  std::vector<LaneHit> hits;
-  std::size_t count = 0;             ///< of the hits
+  LaneHits hits;
   std::uint32_t cell = 0;            ///< where findAhead() was last
   std::uint32_t ahead_of = kNoCell;  ///< the block is what lies ahead of the balls of this cell
   LaneBlock ahead;
-  BlockHits ahead_hits;
 
   static constexpr std::uint32_t kNoCell = ~std::uint32_t{0};
+
+  void makeRoom(std::size_t more_runs) {
+    if (runs.size() < run_count + more_runs) runs.resize(2 * (run_count + more_runs));
+  }
 
   /// Where a lane of the block comes from.
   const LaneRun& runOf(std::uint32_t block_lane) const {
@@ -179,7 +181,7 @@ class SweptGrid {
   /// Finds the balls of the same level that some balls may meet in this frame, each pair from one
   /// of its ends only. All balls are on their first paths.
   /// @param first, last  positions of the balls to look from; done are the first ones, of one cell
-  /// @param search       takes the hits in `ahead_hits`: sphere k is the ball at first + k
+  /// @param search       takes the hits: lanes of `ahead`, of the ball at first + their source
   /// @return the first position that is not done
   std::size_t findAhead(std::size_t first, std::size_t last, SweptSearch& search) const;
 
@@ -227,11 +229,20 @@ class SweptGrid {
   struct Range {
     Cell first, last;
   };
+  struct CellBox {
+    Range x, y, z;
+  };
 
   // Share of a distance by which tests in single precision may falsify it: 8 roundings.
   static constexpr float kSlack = 5e-7F;
 
   static constexpr int kBins = 256;  // octaves of radius, 2^-128 .. 2^127 m
+
+  // Without a branch, which std::clamp of values in memory has.
+  static double clamped(double x, double low, double high) {
+    x = x > low ? x : low;
+    return x < high ? x : high;
+  }
 
   static int binOf(double radius) {
     int exponent = 0;
@@ -266,7 +277,7 @@ class SweptGrid {
 
   // The cell of a place, not yet taken modulo the number of cells.
   static Cell cellOf(const Level& level, std::size_t k, double x) {
-    const double cell = std::min(std::max(x * level.inverse_edge[k], level.low[k]), level.high[k]);
+    const double cell = clamped(x * level.inverse_edge[k], level.low[k], level.high[k]);
     const auto whole = static_cast<Cell>(cell);
     return whole - (cell < static_cast<double>(whole) ? 1 : 0);
   }
@@ -274,8 +285,8 @@ class SweptGrid {
   // The cell that holds a ball, from 0 on: in a periodic box never one of another image, not even
   // by rounding.
   static Cell homeOf(const Level& level, std::size_t k, float x) {
-    const double cell = std::min(std::max(double(x) * level.inverse_edge[k], level.home_low[k]),
-                                 level.home_high[k]);
+    const double cell =
+        clamped(double(x) * level.inverse_edge[k], level.home_low[k], level.home_high[k]);
     const auto whole = static_cast<Cell>(cell);
     return (whole - (cell < static_cast<double>(whole) ? 1 : 0)) & level.home_mask[k];
   }
@@ -320,12 +331,12 @@ class SweptGrid {
 
   // Within single precision, whatever is asked.
   float inUnits(double length) const {
-    return static_cast<float>(std::min(std::max(length * per_unit_, -1e30), 1e30));
+    return static_cast<float>(clamped(length * per_unit_, -1e30, 1e30));
   }
 
-  std::array<Range, 3> boxAround(const Level& level, const SweptSphere& sphere,
-                                 const SweptBall& ball, double reach) const;
-  void addRows(const Level& level, Cell z, Range y, Range x, SweptSearch& search) const;
+  CellBox boxAround(const Level& level, const SweptSphere& sphere, const SweptBall& ball,
+                    double reach) const;
+  void addBox(const Level& level, const CellBox& box, SweptSearch& search) const;
   void addWrapped(const Level& level, const std::uint32_t* begins, Range x, float sy, float sz,
                   SweptSearch& search) const;
   void run(const SweptSphere& sphere, SweptSearch& search) const;

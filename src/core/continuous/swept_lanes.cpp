@@ -17,11 +17,11 @@ namespace ball_sim::core {
 namespace {
 
 // Notes hits that come as bits; each set of instructions does so in a loop, or at once.
-inline __attribute__((always_inline)) void appendEach(unsigned bits, std::uint32_t sphere,
-                                                      std::uint32_t begin, std::uint32_t* spheres,
-                                                      std::uint32_t* lanes) {
+inline __attribute__((always_inline)) void appendEach(unsigned bits, std::uint32_t begin,
+                                                      std::uint32_t source, std::uint32_t* lanes,
+                                                      std::uint32_t* sources) {
   for (; bits != 0; bits &= bits - 1) {
-    *spheres++ = sphere;
+    *sources++ = source;
     *lanes++ = begin + static_cast<unsigned>(__builtin_ctz(bits));
   }
 }
@@ -82,14 +82,14 @@ inline __attribute__((always_inline)) unsigned bitsOfGreater(Floats a, Floats b)
   return _mm512_cmp_ps_mask(a, b, _CMP_GT_OQ);
 }
 
-inline __attribute__((always_inline)) void append(unsigned bits, std::uint32_t sphere,
-                                                  std::uint32_t begin, std::uint32_t* spheres,
-                                                  std::uint32_t* lanes) {
+inline __attribute__((always_inline)) void append(unsigned bits, std::uint32_t begin,
+                                                  std::uint32_t source, std::uint32_t* lanes,
+                                                  std::uint32_t* sources) {
   const __m512i steps = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
   const __m512i all = _mm512_add_epi32(_mm512_set1_epi32(static_cast<int>(begin)), steps);
   const auto mask = static_cast<__mmask16>(bits);
   _mm512_storeu_si512(lanes, _mm512_maskz_compress_epi32(mask, all));
-  _mm512_storeu_si512(spheres, _mm512_set1_epi32(static_cast<int>(sphere)));
+  _mm512_storeu_si512(sources, _mm512_set1_epi32(static_cast<int>(source)));
 }
 
 #include "continuous/swept_lanes_kernel.inc"
@@ -125,9 +125,9 @@ const Kernels& kernels() {
 
 }  // namespace
 
-std::size_t findOverlaps(const SweptLanes& lanes, const SweptSphere& sphere, const LaneRun* runs,
-                         std::size_t count, LaneHit* hits) {
-  return kernels().find_in_runs(lanes, sphere, runs, count, hits);
+void findInRuns(const SweptLanes& lanes, const SweptSphere& sphere, const LaneRun* runs,
+                std::size_t count, LaneHits& hits) {
+  kernels().find_in_runs(lanes, sphere, runs, count, hits);
 }
 
 void gatherRuns(const SweptLanes& lanes, const LaneRun* runs, std::size_t count, LaneBlock& block) {
@@ -141,7 +141,7 @@ void gatherRuns(const SweptLanes& lanes, const LaneRun* runs, std::size_t count,
 }
 
 void findInBlock(const LaneBlock& block, const SweptSphere* spheres, std::size_t count,
-                 std::size_t begin, std::size_t step, BlockHits& hits) {
+                 std::size_t begin, std::size_t step, LaneHits& hits) {
   kernels().find_in_block(block, spheres, count, begin, step, hits);
 }
 

@@ -49,9 +49,17 @@ struct LaneRun {
   float sx, sy, sz;
 };
 
-struct LaneHit {
-  std::uint32_t lane;
-  std::uint32_t run;  ///< index of the run it was found in
+/// Lanes that overlap a sphere, one of several.
+struct LaneHits {
+  std::vector<std::uint32_t> lanes;    ///< this and the next have room for more
+  std::vector<std::uint32_t> sources;  ///< numbers of the runs, or of the spheres
+  std::size_t count = 0;
+
+  void makeRoom(std::size_t size) {
+    if (lanes.size() >= size) return;
+    lanes.resize(2 * size);
+    sources.resize(2 * size);
+  }
 };
 
 /// The lanes of some runs, copied side by side, each in the image that is meant.
@@ -61,32 +69,18 @@ struct LaneBlock {
   std::size_t count = 0;
 };
 
-/// Who overlaps whom: a block's lanes and spheres that were looked for.
-struct BlockHits {
-  std::vector<std::uint32_t> spheres;  ///< their numbers; as below, has room for more
-  std::vector<std::uint32_t> lanes;    ///< of the block
-  std::size_t count = 0;
-
-  void makeRoom(std::size_t size) {
-    if (lanes.size() >= size) return;
-    spheres.resize(2 * size);
-    lanes.resize(2 * size);
-  }
-};
-
 /// Finds the lanes that overlap a sphere.
-/// @param hits  room for all lanes of all runs
-/// @return number of hits
-std::size_t findOverlaps(const SweptLanes& lanes, const SweptSphere& sphere, const LaneRun* runs,
-                         std::size_t count, LaneHit* hits);
+/// @param hits  has room for all lanes of all runs, and kWidth more; is set, with numbers of runs
+void findInRuns(const SweptLanes& lanes, const SweptSphere& sphere, const LaneRun* runs,
+                std::size_t count, LaneHits& hits);
 
 /// Copies runs into a block.
 void gatherRuns(const SweptLanes& lanes, const LaneRun* runs, std::size_t count, LaneBlock& block);
 
 /// Finds what some spheres overlap in a block.
 /// @param begin, step  sphere k is looked for from lane `begin + k * step` on
-/// @param hits         are set, sphere after sphere
+/// @param hits         is set, sphere after sphere, with their numbers
 void findInBlock(const LaneBlock& block, const SweptSphere* spheres, std::size_t count,
-                 std::size_t begin, std::size_t step, BlockHits& hits);
+                 std::size_t begin, std::size_t step, LaneHits& hits);
 
 }  // namespace ball_sim::core
