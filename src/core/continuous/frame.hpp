@@ -120,7 +120,7 @@ class Frame {
 
  private:
   static constexpr std::uint32_t kFramesPerLayout = 64;
-  static constexpr std::uint32_t kFramesPerRenumbering = 4;
+  static constexpr std::uint32_t kFramesPerRenumbering = 8;
 
   static std::array<SweptAxis, 3> axesOf(const Surroundings& surroundings) {
     std::array<SweptAxis, 3> axes;

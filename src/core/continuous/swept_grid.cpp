@@ -3,8 +3,9 @@
 namespace ball_sim::core {
 namespace {
 
-// Cells are this share of the reach of a level's largest ball wide, and half of it along the rows.
-constexpr double kEdgeOfReach = 1.6;
+// Cells are as wide as two first paths of a level reach, and so much more that they stay so while
+// the longest path changes: a ball meets others in the cells beside its own at most.
+constexpr double kMoreWidth = 1.15;
 constexpr double kBallsPerCell = 0.5;  // and hold no fewer
 
 // What testing a path costs, in searches of a level that find nothing: measured.
@@ -84,12 +85,14 @@ void SweptGrid::chooseLevels(const std::array<Bin, kBins>& bins) {
   chooseSeekers();
 }
 
+double SweptGrid::edgeFor(const Bin& bin) const { return kMoreWidth * 2 * (bin.reach - planned_); }
+
 void SweptGrid::cut(Level& level, const Bin& bin) const {
   const double most = bin.count / kBallsPerCell + 8;
-  double edge = kEdgeOfReach * bin.reach;
+  double edge = edgeFor(bin);
   const auto countAlong = [&](std::size_t k) -> double {
     if (axes_[k].kind == SweptAxis::Kind::flat) return 1;
-    const double wanted = std::max(1.0, std::floor(extent_[k] / edge * (k == 0 ? 2 : 1)));
+    const double wanted = std::max(1.0, std::floor(extent_[k] / edge));
     if (axes_[k].kind != SweptAxis::Kind::open) return wanted;
     return std::exp2(std::ceil(std::log2(std::max(wanted, 4.0))));
   };
@@ -99,7 +102,7 @@ void SweptGrid::cut(Level& level, const Bin& bin) const {
     const double count = countAlong(k);
     level.cells[k] = static_cast<Cell>(count);
     const bool open = axes_[k].kind == SweptAxis::Kind::open;
-    const double width = open ? (k == 0 ? edge / 2 : edge) : axes_[k].length / count;
+    const double width = open ? edge : axes_[k].length / count;
     level.inverse_edge[k] = unit_ / width;
     const bool closed = axes_[k].kind == SweptAxis::Kind::closed;
     level.low[k] = closed ? 0 : -kFarthestCell;
@@ -118,7 +121,7 @@ void SweptGrid::chooseSeekers() {
     for (std::size_t coarse = fine + 1; coarse < count; ++coarse) {
       const double reach = groups_[fine].reach + groups_[coarse].reach;
       const auto cost = [&](const Bin& seeker, const Bin& sought) {
-        const double rows = power(2 * reach / (kEdgeOfReach * sought.reach) + 1, dimension() - 1);
+        const double rows = power(2 * reach / edgeFor(sought) + 1, dimension() - 1);
         return seeker.count *
                (rows / 9 + kCostOfTest * occupancy(sought.count, reach, dimension(), volume()));
       };

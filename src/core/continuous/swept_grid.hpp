@@ -260,10 +260,11 @@ class SweptGrid {
 
   struct Bin {
     double count = 0;
-    double reach = 0;  // m, the largest: radius and way
+    double reach = 0;  // m, the largest: radius and way, of a whole path
   };
 
   void chooseLevels(const std::array<Bin, kBins>& bins);
+  double edgeFor(const Bin& bin) const;  // m, of a cell
   void cut(Level& level, const Bin& bin) const;
   void chooseSeekers();
 
