@@ -57,7 +57,7 @@ class Buffer {
   }
 
  private:
-  static constexpr std::size_t kFew = 1024 / sizeof(T);
+  static constexpr std::size_t kFew = 4096 / sizeof(T);
 
   // Rare, so it is kept out of the callers' code.
   __attribute__((noinline)) void grow(std::size_t size) { makeRoom(size + size / 8 + 1); }
