@@ -233,7 +233,8 @@ class Continuous final : public Method {
   // Finds all that happens from now to the end of a new frame.
   void openFrame(Real limit) {
     WorkerPool& pool = pools_.forWork(balls_.size(), kFewBalls);
-    frame_.open({now_, limit, era_, origin_, statistics_.ball_collisions}, pool);
+    const std::uint64_t searches = 2 * statistics_.ball_collisions + statistics_.wall_collisions;
+    frame_.open({now_, limit, era_, origin_, searches}, pool);
     pending_.clear();
     if (++frames_since_giving_back_ >= kFramesPerGivingBack) giveBackRoom();
     search_.findAll(pool, pending_);

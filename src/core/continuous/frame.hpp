@@ -26,11 +26,11 @@ namespace ball_sim::core::continuous {
 /// When a frame begins, and what has happened until then.
 template <class Real>
 struct FrameStart {
-  Real now;     ///< s, in this era
-  Real limit;   ///< s, in this era: as far as anybody looks, if nothing moves
-  Real era;     ///< s, length of this era
-  Time origin;  ///< when this era began
-  std::uint64_t ball_collisions;
+  Real now;                ///< s, in this era
+  Real limit;              ///< s, in this era: as far as anybody looks, if nothing moves
+  Real era;                ///< s, length of this era
+  Time origin;             ///< when this era began
+  std::uint64_t searches;  ///< after impacts, one a ball
 };
 
 template <class Real, bool kGravity>
@@ -169,7 +169,7 @@ class Frame {
     layout_age_ = 0;
   }
 
-  // Counts impacts from one call to the next.
+  // Counts searches from one call to the next.
   FrameSurvey takeSurvey(const FrameStart<Real>& from) {
     FrameSurvey survey;
     survey.planar = planar_;
@@ -178,10 +178,10 @@ class Frame {
       using std::sqrt;
       survey.add(double(balls_.bodies[slot].radius), double(sqrt(dot(v, v))));
     }
-    const std::uint64_t impacts = from.ball_collisions - collisions_at_layout_;
+    const std::uint64_t searches = from.searches - searches_at_layout_;
     const double elapsed = double(from.now - layout_time_) + (from.origin - layout_origin_);
-    if (impacts > 0 && elapsed > 0) survey.impact_rate = double(impacts) / elapsed;
-    collisions_at_layout_ = from.ball_collisions;
+    if (searches > 0 && elapsed > 0) survey.search_rate = double(searches) / elapsed;
+    searches_at_layout_ = from.searches;
     layout_time_ = from.now;
     layout_origin_ = from.origin;
     return survey;
@@ -259,7 +259,7 @@ class Frame {
   Real length_ = 0;                              // s
   std::uint32_t layout_age_ = kFramesPerLayout;  // frames
   std::uint32_t frames_since_renumbering_ = kFramesPerRenumbering;
-  std::uint64_t collisions_at_layout_ = 0;
+  std::uint64_t searches_at_layout_ = 0;
   Real layout_time_ = 0;  // s, in the era that began at layout_origin_
   Time layout_origin_;
 };

@@ -15,7 +15,7 @@ struct FrameSurvey {
   double fastest = 0;  ///< m/s
   double volume = 0;   ///< m^3 (planar: m^2), where the balls are
   bool planar = false;
-  std::optional<double> impact_rate;  ///< 1/s, of all balls; unknown: as in a thin gas
+  std::optional<double> search_rate;  ///< 1/s, after impacts; unknown: as in a thin gas
 
   void add(double radius, double speed) {
     ++count;
