@@ -378,10 +378,14 @@ class Continuous final : public Method {
       balls_.cards[slot] = after.card;
       balls_.velocityChanged(slot, after.card.met);
     }
-    const SweptBall rest_a = goOn(outcome.impact.a);
-    const SweptBall rest_b = goOn(outcome.impact.b);
-    searchRest(outcome.impact.a, rest_a, outcome.impact);
-    searchRest(outcome.impact.b, rest_b, outcome.impact);
+    const Rest a = goOn(outcome.impact.a);
+    const Rest b = goOn(outcome.impact.b);
+    if (!frame_.isOpen()) return;
+    Searcher<Real>& searcher = search_.searcher(0);
+    search_.considerWall(a.slot, searcher);
+    search_.considerWall(b.slot, searcher);
+    search_.lookAround(a, b, searcher);
+    findWhatFollows(outcome.impact);
   }
 
   void takeWall(const Impact<Real>& impact) {
@@ -408,27 +412,27 @@ class Continuous final : public Method {
       }
     }
     balls_.velocityChanged(slot);
-    searchRest(slot, goOn(slot), impact);
+    const Rest rest = goOn(slot);
+    if (!frame_.isOpen()) return;
+    search_.considerWall(slot, search_.searcher(0));
+    search_.lookAround(rest, search_.searcher(0));
+    findWhatFollows(impact);
   }
 
   // Takes a ball's new path into the frame, or ends the frame if it leads too far.
   // @return the path in the grid
-  SweptBall goOn(Slot slot) {
+  Rest goOn(Slot slot) {
     balls_.bringHome(slot);
     balls_.findWallVisit(slot);
-    return frame_.change(slot);
+    return {slot, frame_.change(slot)};
   }
 
-  // Finds all impacts of a ball from its last change to the end of the frame.
-  // @param rest  its path in the grid
-  // @param now   the impact that led to it
-  void searchRest(Slot slot, const SweptBall& rest, const Impact<Real>& now) {
-    if (!frame_.isOpen()) return;
+  // Finds all impacts with those who have been looked for, to the end of the frame.
+  // @param now  the impact that they were looked for after
+  void findWhatFollows(const Impact<Real>& now) {
     Searcher<Real>& searcher = search_.searcher(0);
-    search_.considerWall(slot, searcher);
-    search_.lookAround(slot, rest, searcher);
     search_.identify(searcher, [this](Slot other) { plans_.fetch(other); });
-    plans_.consider(balls_.pathOf(slot), now, searcher, waiting_);
+    plans_.consider(now, searcher, waiting_);
     search_.considerPairs(searcher);
     for (const Impact<Real>& impact : searcher.found) {
       if (impact.time > slice_end_) {

@@ -31,6 +31,12 @@ struct Pair {
   Turns turns;          ///< of the image that was found; 0 where only one is near
 };
 
+/// A ball's path in the grid to the end of the frame.
+struct Rest {
+  Slot slot;
+  SweptBall path;
+};
+
 /// What one thread needs to search.
 template <class Real>
 struct alignas(64) Searcher {
@@ -88,12 +94,25 @@ class ImpactSearch {
   // --- the passes of a search
 
   /// Finds where others are that a ball may meet on a path.
-  /// @param rest  the path in the grid
-  void lookAround(Slot slot, const SweptBall& rest, Searcher<Real>& searcher) const {
+  void lookAround(const Rest& rest, Searcher<Real>& searcher) const {
+    for (std::size_t level = 0; level < frame_.grid().levels(); ++level) {
+      lookInLevel(level, rest, searcher);
+    }
+  }
+
+  /// The same for two balls that have just met: they mostly look into the same cells.
+  void lookAround(const Rest& a, const Rest& b, Searcher<Real>& searcher) const {
     const SweptGrid& grid = frame_.grid();
     for (std::size_t level = 0; level < grid.levels(); ++level) {
-      grid.findAround(level, rest, searcher.search);
-      noteHits(slot, searcher);
+      if (grid.gatherAround(level, a.path, b.path, searcher.search)) {
+        grid.findGathered(a.path, searcher.search);
+        noteHits(a.slot, searcher);
+        grid.findGathered(b.path, searcher.search);
+        noteHits(b.slot, searcher);
+      } else {
+        lookInLevel(level, a, searcher);
+        lookInLevel(level, b, searcher);
+      }
     }
   }
 
@@ -218,9 +237,13 @@ class ImpactSearch {
     const std::size_t level = grid.levelAt(p);
     for (std::size_t other = 0; other < grid.levels(); ++other) {
       if (!grid.seeks(level, other)) continue;
-      grid.findAround(other, frame_.inGrid(balls_.pathOf(slot)), searcher.search);
-      noteHits(slot, searcher);
+      lookInLevel(other, {slot, frame_.inGrid(balls_.pathOf(slot))}, searcher);
     }
+  }
+
+  void lookInLevel(std::size_t level, const Rest& rest, Searcher<Real>& searcher) const {
+    frame_.grid().findAround(level, rest.path, searcher.search);
+    noteHits(rest.slot, searcher);
   }
 
   // Notes where the balls from `first` on have found others, and asks memory who they are.

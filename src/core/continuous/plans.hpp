@@ -82,20 +82,21 @@ class Plans {
     if (left_ > 0) touch(&plan_of_[slot]);
   }
 
-  /// Ends the plans that a new path meets within the slice, and finds its impacts with those that
+  /// Ends the plans that new paths meet within the slice, and finds their impacts with those that
   /// are left.
-  /// @param now       the impact that led to the path: plans that are earlier come true, the others
+  /// @param now       the impact that led to the paths: plans that are earlier come true, the
+  /// others
   ///                  are dropped
-  /// @param searcher  has the pairs of the path, and takes the impacts
-  void consider(const Path<Real>& path, const Impact<Real>& now, Searcher<Real>& searcher,
-                Heap& waiting) {
+  /// @param searcher  has the pairs of the paths, and takes the impacts
+  void consider(const Impact<Real>& now, Searcher<Real>& searcher, Heap& waiting) {
     if (left_ == 0) return;
     for (const Pair& pair : searcher.pairs) {
-      if (isPlanned(pair.other) && isMet(path, pair)) finish(plan_of_[pair.other], now, waiting);
+      if (isPlanned(pair.other) && isMet(pair)) finish(plan_of_[pair.other], now, waiting);
     }
     for (const Pair& pair : searcher.pairs) {
       if (!isPlanned(pair.other)) continue;
-      const Impact<Real> impact = search_.meeting(path, pathOf(pair.other), pair.turns);
+      const Impact<Real> impact =
+          search_.meeting(balls_.pathOf(pair.slot), pathOf(pair.other), pair.turns);
       if (impact.time <= frame_.end()) searcher.found.push_back(impact);
     }
   }
@@ -265,16 +266,19 @@ class Plans {
     for (std::size_t i = begin; i < end; ++i) {
       const Plan& plan = plans_[i];
       if (plan.state != State::open) disturbed.push_back(static_cast<std::uint32_t>(i));
-      for (std::size_t side = 0; side < 2; ++side) {
-        const Path<Real> path = plan.path(side);
-        if (!balls_.walls.empty()) note(search_.wallImpact(path, plan.wall_visits[side]));
-        search_.lookAround(path.slot, frame_.inGrid(path), searcher);
+      if (!balls_.walls.empty()) {
+        for (std::size_t side = 0; side < 2; ++side) {
+          note(search_.wallImpact(plan.path(side), plan.wall_visits[side]));
+        }
       }
+      search_.lookAround(restOf(plan.path(0)), restOf(plan.path(1)), searcher);
     }
     search_.identify(searcher, [this](Slot slot) { fetch(slot); });
     for (const Pair& pair : searcher.pairs) considerPair(pair, note);
     searcher.pairs.clear();
   }
+
+  Rest restOf(const Path<Real>& path) const { return {path.slot, frame_.inGrid(path)}; }
 
   // What a planned path meets: the other as it is now, and as it is planned, each two once.
   template <class Note>
@@ -291,8 +295,9 @@ class Plans {
 
   // --- what becomes of plans
 
-  // Whether a path meets a ball that is planned within the slice, be it as it is now or as planned.
-  bool isMet(const Path<Real>& path, const Pair& pair) const {
+  // Whether a ball meets one that is planned within the slice, be it as it is now or as planned.
+  bool isMet(const Pair& pair) const {
+    const Path<Real> path = balls_.pathOf(pair.slot);
     return search_.meeting(path, pathOf(pair.other), pair.turns).time <= slice_end_ ||
            search_.meeting(path, balls_.pathOf(pair.other), pair.turns).time <= slice_end_;
   }

@@ -185,17 +185,17 @@ void SweptGrid::setNear(Level& level) const {
   }
 }
 
-SweptGrid::CellBox SweptGrid::boxAround(const Level& level, const SweptSphere& sphere,
-                                        const SweptBall& ball, double reach) const {
-  const double around = (ball.radius + reach) * per_unit_ + 2 * double(margin_);
-  const auto along = [&](std::size_t k, double middle) -> Range {
+SweptGrid::CellBox SweptGrid::boxAround(const Level& level, const SweptBall& ball) const {
+  const double around = (ball.radius + level.reach_later.value()) * per_unit_ + 2 * double(margin_);
+  const auto along = [&](std::size_t k) -> Range {
+    const double middle = double(inUnits(ball.middle[k] - axes_[k].origin));
     const double half = std::abs(ball.half[k]) * per_unit_ + around;
     const Range range = {cellOf(level, k, middle - half), cellOf(level, k, middle + half)};
     const Cell last = level.cells[k] - 1;
     const bool all = range.last - range.first >= last && axes_[k].kind == SweptAxis::Kind::open;
     return all ? Range{0, last} : range;
   };
-  return {along(0, double(sphere.x)), along(1, double(sphere.y)), along(2, double(sphere.z))};
+  return {along(0), along(1), along(2)};
 }
 
 // Rows of cells; most often no axis is wrapped around.
@@ -248,14 +248,29 @@ void SweptGrid::addWrapped(const Level& level, const std::uint32_t* begins, Rang
   }
 }
 
-void SweptGrid::findAround(std::size_t index, const SweptBall& ball, SweptSearch& search) const {
+bool SweptGrid::gatherAround(std::size_t index, const SweptBall& a, const SweptBall& b,
+                             SweptSearch& search) const {
   const Level& level = levels_[index];
+  CellBox box = boxAround(level, a);
+  if (&a != &b) {
+    const CellBox other = boxAround(level, b);
+    if (!join(box.x, other.x) || !join(box.y, other.y) || !join(box.z, other.z)) return false;
+  }
   search.run_count = search.lane_count = 0;
   search.ahead_of = SweptSearch::kNoCell;
-  const SweptSphere sphere = sphereOf(ball);
-  addBox(level, boxAround(level, sphere, ball, level.reach_later.value()), search);
+  addBox(level, box, search);
   search.hits.makeRoom(search.lane_count + SweptLanes::kWidth);
-  findInRuns(lanes_, sphere, search.runs.data(), search.run_count, search.hits);
+  return true;
+}
+
+bool SweptGrid::join(Range& range, const Range& other) {
+  if (range.last < other.first || other.last < range.first) return false;
+  range = {std::min(range.first, other.first), std::max(range.last, other.last)};
+  return true;
+}
+
+void SweptGrid::findGathered(const SweptBall& ball, SweptSearch& search) const {
+  findInRuns(lanes_, sphereOf(ball), search.runs.data(), search.run_count, search.hits);
 }
 
 std::size_t SweptGrid::findAhead(std::size_t first, std::size_t last, SweptSearch& search) const {

@@ -186,7 +186,18 @@ class SweptGrid {
   std::size_t findAhead(std::size_t first, std::size_t last, SweptSearch& search) const;
 
   /// Finds all balls of a level that may meet a ball, by how far balls of the level have got.
-  void findAround(std::size_t level, const SweptBall& ball, SweptSearch& search) const;
+  void findAround(std::size_t level, const SweptBall& ball, SweptSearch& search) const {
+    gatherAround(level, ball, ball, search);
+    findGathered(ball, search);
+  }
+
+  /// Gathers, for two balls, where others of a level may be that meet one of them.
+  /// @return false, and nothing is gathered: they are far from each other, so look for each alone
+  bool gatherAround(std::size_t level, const SweptBall& a, const SweptBall& b,
+                    SweptSearch& search) const;
+
+  /// Finds the balls that may meet a ball, one of those that was gathered for.
+  void findGathered(const SweptBall& ball, SweptSearch& search) const;
 
   std::size_t bytes() const {
     std::size_t bytes = lanes_.bytes() + (slots_.capacity() + positions_.capacity()) * 4 +
@@ -232,6 +243,7 @@ class SweptGrid {
   struct CellBox {
     Range x, y, z;
   };
+  static bool join(Range& range, const Range& other);
 
   // Share of a distance by which tests in single precision may falsify it: 8 roundings.
   static constexpr float kSlack = 5e-7F;
@@ -335,8 +347,7 @@ class SweptGrid {
     return static_cast<float>(clamped(length * per_unit_, -1e30, 1e30));
   }
 
-  CellBox boxAround(const Level& level, const SweptSphere& sphere, const SweptBall& ball,
-                    double reach) const;
+  CellBox boxAround(const Level& level, const SweptBall& ball) const;
   void addBox(const Level& level, const CellBox& box, SweptSearch& search) const;
   void addWrapped(const Level& level, const std::uint32_t* begins, Range x, float sy, float sz,
                   SweptSearch& search) const;
