@@ -12,6 +12,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "ball_sim/time_of_impact.hpp"
@@ -100,18 +101,21 @@ class ImpactSearch {
     }
   }
 
-  /// The same for two balls that have just met: they mostly look into the same cells.
-  void lookAround(const Rest& a, const Rest& b, Searcher<Real>& searcher) const {
+  /// The same for two balls that have just met: they mostly look into the same cells. Each other
+  /// they find once, from the smaller slot.
+  void lookAround(Rest a, Rest b, Searcher<Real>& searcher) const {
+    if (b.slot < a.slot) std::swap(a, b);
     const SweptGrid& grid = frame_.grid();
+    const std::uint32_t other = grid.positions()[a.slot];
     for (std::size_t level = 0; level < grid.levels(); ++level) {
       if (grid.gatherAround(level, a.path, b.path, searcher.search)) {
         grid.findGathered(a.path, searcher.search);
         noteHits(a.slot, searcher);
         grid.findGathered(b.path, searcher.search);
-        noteHits(b.slot, searcher);
+        noteHits(b.slot, searcher, other);
       } else {
         lookInLevel(level, a, searcher);
-        lookInLevel(level, b, searcher);
+        lookInLevel(level, b, searcher, other);
       }
     }
   }
@@ -121,15 +125,11 @@ class ImpactSearch {
   template <class Fetch>
   void identify(Searcher<Real>& searcher, const Fetch& fetch) const {
     const SweptGrid& grid = frame_.grid();
-    std::size_t kept = 0;
     for (Pair& pair : searcher.pairs) {
       pair.other = grid.slotAt(pair.other);
-      if (pair.other == pair.slot) continue;
       touch(&balls_.bodies[pair.other]);
       fetch(pair.other);
-      searcher.pairs[kept++] = pair;
     }
-    searcher.pairs.resize(kept);
   }
 
   /// Finds the impacts of pairs as they are now.
@@ -241,44 +241,53 @@ class ImpactSearch {
     }
   }
 
-  void lookInLevel(std::size_t level, const Rest& rest, Searcher<Real>& searcher) const {
+  void lookInLevel(std::size_t level, const Rest& rest, Searcher<Real>& searcher,
+                   std::uint32_t seen = kNoLane) const {
     frame_.grid().findAround(level, rest.path, searcher.search);
-    noteHits(rest.slot, searcher);
+    noteHits(rest.slot, searcher, seen);
   }
 
   // Notes where the balls from `first` on have found others, and asks memory who they are.
   void noteAhead(std::size_t first, Searcher<Real>& searcher) const {
     const SweptGrid& grid = frame_.grid();
     const SweptSearch& search = searcher.search;
-    const LaneHits& hits = search.hits;
-    const std::size_t before = searcher.pairs.size();
-    searcher.pairs.resize(before + hits.count);
-    for (std::size_t i = 0; i < hits.count; ++i) {
-      const std::uint32_t lane = search.ahead.origins[hits.lanes[i]];
+    const bool one_image_is_near = frame_.oneImageIsNear();
+    std::size_t end = makeRoom(searcher);
+    for (std::size_t i = 0; i < search.hits.count; ++i) {
+      const std::size_t position = first + search.hits.sources[i];
+      const std::uint32_t lane = search.ahead.origins[search.hits.lanes[i]];
+      Pair& pair = searcher.pairs[end];
+      pair = {grid.slotAt(position), lane, {0, 0, 0}};
+      if (!one_image_is_near) pair.turns = grid.imageOf(search.runOf(search.hits.lanes[i]));
       grid.fetchSlot(lane);
-      searcher.pairs[before + i] = {grid.slotAt(first + hits.sources[i]), lane, {0, 0, 0}};
+      end += lane != position ? 1 : 0;
     }
-    if (frame_.oneImageIsNear()) return;
-    for (std::size_t i = 0; i < hits.count; ++i) {
-      searcher.pairs[before + i].turns = grid.imageOf(search.runOf(hits.lanes[i]));
-    }
+    searcher.pairs.resize(end);
   }
 
-  // Notes where a search has found others, and asks memory who they are.
-  void noteHits(Slot slot, Searcher<Real>& searcher) const {
+  // The same where a search has found others. @param seen  a lane that is not to be noted
+  void noteHits(Slot slot, Searcher<Real>& searcher, std::uint32_t seen = kNoLane) const {
     const SweptGrid& grid = frame_.grid();
     const SweptSearch& search = searcher.search;
-    const LaneHits& hits = search.hits;
+    const bool one_image_is_near = frame_.oneImageIsNear();
+    const std::uint32_t own = grid.positions()[slot];
+    std::size_t end = makeRoom(searcher);
+    for (std::size_t i = 0; i < search.hits.count; ++i) {
+      const std::uint32_t lane = search.hits.lanes[i];
+      Pair& pair = searcher.pairs[end];
+      pair = {slot, lane, {0, 0, 0}};
+      if (!one_image_is_near) pair.turns = grid.imageOf(search.runs[search.hits.sources[i]]);
+      grid.fetchSlot(lane);
+      end += (lane != own) & (lane != seen) ? 1 : 0;
+    }
+    searcher.pairs.resize(end);
+  }
+
+  // For all hits. @return where the first goes
+  static std::size_t makeRoom(Searcher<Real>& searcher) {
     const std::size_t before = searcher.pairs.size();
-    searcher.pairs.resize(before + hits.count);
-    for (std::size_t i = 0; i < hits.count; ++i) {
-      grid.fetchSlot(hits.lanes[i]);
-      searcher.pairs[before + i] = {slot, hits.lanes[i], {0, 0, 0}};
-    }
-    if (frame_.oneImageIsNear()) return;
-    for (std::size_t i = 0; i < hits.count; ++i) {
-      searcher.pairs[before + i].turns = grid.imageOf(search.runs[hits.sources[i]]);
-    }
+    searcher.pairs.resize(before + searcher.search.hits.count);
+    return before;
   }
 
   // In straight relative motion two balls that have just met do not meet again. In a periodic box
@@ -290,6 +299,8 @@ class ImpactSearch {
     return dot(dx, dx) < reach * reach * Real(1 + 1e-6) &&
            (id_a < id_b ? along : -along) > Real(0.9) * reach;
   }
+
+  static constexpr std::uint32_t kNoLane = ~std::uint32_t{0};
 
   const Balls<Real, kGravity>& balls_;
   const Frame<Real, kGravity>& frame_;
