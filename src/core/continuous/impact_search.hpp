@@ -102,20 +102,23 @@ class ImpactSearch {
   }
 
   /// The same for two balls that have just met: they mostly look into the same cells. Each other
-  /// they find once, from the smaller slot.
+  /// they find once, from the smaller slot; on straight paths to a near image they do not meet
+  /// again.
   void lookAround(Rest a, Rest b, Searcher<Real>& searcher) const {
     if (b.slot < a.slot) std::swap(a, b);
     const SweptGrid& grid = frame_.grid();
-    const std::uint32_t other = grid.positions()[a.slot];
+    const bool never_again = !kGravity && frame_.oneImageIsNear();
+    const std::uint32_t lane_a = grid.positions()[a.slot];
+    const std::uint32_t seen = never_again ? grid.positions()[b.slot] : kNoLane;
     for (std::size_t level = 0; level < grid.levels(); ++level) {
       if (grid.gatherAround(level, a.path, b.path, searcher.search)) {
         grid.findGathered(a.path, searcher.search);
-        noteHits(a.slot, searcher);
+        noteHits(a.slot, searcher, seen);
         grid.findGathered(b.path, searcher.search);
-        noteHits(b.slot, searcher, other);
+        noteHits(b.slot, searcher, lane_a);
       } else {
-        lookInLevel(level, a, searcher);
-        lookInLevel(level, b, searcher, other);
+        lookInLevel(level, a, searcher, seen);
+        lookInLevel(level, b, searcher, lane_a);
       }
     }
   }
