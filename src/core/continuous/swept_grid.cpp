@@ -107,8 +107,8 @@ void SweptGrid::cut(Level& level, const Bin& bin) const {
     const bool closed = axes_[k].kind == SweptAxis::Kind::closed;
     level.low[k] = closed ? 0 : -kFarthestCell;
     level.high[k] = closed ? count - 1 : kFarthestCell;
-    level.home_low[k] = open ? -kFarthestCell : 0;
-    level.home_high[k] = open ? kFarthestCell : count - 1;
+    level.home_offset[k] = open ? kFarthestCell : 0;
+    level.home_high[k] = open ? 2 * kFarthestCell - 1 : count - 1;
     level.home_mask[k] = open ? level.cells[k] - 1 : ~Cell{0};  // of a power of two
   }
 }

@@ -214,8 +214,9 @@ class SweptGrid {
     std::array<double, 3> inverse_edge{};                  // cells per unit
     std::array<Cell, 3> cells = {1, 1, 1};
     std::array<double, 3> low{}, high{};  // cells, limits to those a place may be in
-    // The same for a ball's own cell, and what takes it modulo the number of cells.
-    std::array<double, 3> home_low{}, home_high{};
+    // For a ball's own cell: where cells are counted from, the last one, and what takes it modulo
+    // the number of cells.
+    std::array<double, 3> home_offset{}, home_high{};
     std::array<Cell, 3> home_mask = {0, 0, 0};
     std::uint32_t first_cell = 0;
     // No ball gets further from the middle of its first path, its radius included, m.
@@ -296,12 +297,11 @@ class SweptGrid {
   }
 
   // The cell that holds a ball, from 0 on: in a periodic box never one of another image, not even
-  // by rounding.
+  // by rounding. (Counted from so far that truncation rounds down; what that rounds off is less
+  // than the margin of searches.)
   static Cell homeOf(const Level& level, std::size_t k, float x) {
-    const double cell =
-        clamped(double(x) * level.inverse_edge[k], level.home_low[k], level.home_high[k]);
-    const auto whole = static_cast<Cell>(cell);
-    return (whole - (cell < static_cast<double>(whole) ? 1 : 0)) & level.home_mask[k];
+    const double cell = double(x) * level.inverse_edge[k] + level.home_offset[k];
+    return static_cast<Cell>(clamped(cell, 0, level.home_high[k])) & level.home_mask[k];
   }
 
   // A cell modulo the number of cells, and how far away its image is.
