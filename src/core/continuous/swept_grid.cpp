@@ -6,7 +6,8 @@ namespace {
 // Cells are as wide as two first paths of a level reach, and so much more that they stay so while
 // the longest path changes: a ball meets others in the cells beside its own at most.
 constexpr double kMoreWidth = 1.15;
-constexpr double kBallsPerCell = 0.5;  // and hold no fewer
+constexpr double kBallsPerCell = 3;  // and hold no fewer, unless they are few
+constexpr double kFewCells = 64;
 
 // What testing a path costs, in searches of a level that find nothing: measured.
 constexpr double kCostOfTest = 0.05;
@@ -88,7 +89,7 @@ void SweptGrid::chooseLevels(const std::array<Bin, kBins>& bins) {
 double SweptGrid::edgeFor(const Bin& bin) const { return kMoreWidth * 2 * (bin.reach - planned_); }
 
 void SweptGrid::cut(Level& level, const Bin& bin) const {
-  const double most = bin.count / kBallsPerCell + 8;
+  const double most = std::max(bin.count / kBallsPerCell, kFewCells);
   double edge = edgeFor(bin);
   const auto countAlong = [&](std::size_t k) -> double {
     if (axes_[k].kind == SweptAxis::Kind::flat) return 1;
@@ -96,7 +97,7 @@ void SweptGrid::cut(Level& level, const Bin& bin) const {
     if (axes_[k].kind != SweptAxis::Kind::open) return wanted;
     return std::exp2(std::ceil(std::log2(std::max(wanted, 4.0))));
   };
-  while (countAlong(0) * countAlong(1) * countAlong(2) > std::max(2 * most, 64.0)) edge *= 1.125;
+  while (countAlong(0) * countAlong(1) * countAlong(2) > most) edge *= 1.125;
   for (std::size_t k = 0; k < 3; ++k) {
     if (axes_[k].kind == SweptAxis::Kind::flat) continue;
     const double count = countAlong(k);
