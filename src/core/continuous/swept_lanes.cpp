@@ -16,10 +16,10 @@
 namespace ball_sim::core {
 namespace {
 
-// Notes hits that come as bits; each set of instructions does so in a loop, or at once.
-inline __attribute__((always_inline)) void appendEach(unsigned bits, std::uint32_t begin,
-                                                      std::uint32_t source, std::uint32_t* lanes,
-                                                      std::uint32_t* sources) {
+// Notes hits that come as bits, one by one.
+inline __attribute__((always_inline)) void append(unsigned bits, std::uint32_t begin,
+                                                  std::uint32_t source, std::uint32_t* lanes,
+                                                  std::uint32_t* sources) {
   for (; bits != 0; bits &= bits - 1) {
     *sources++ = source;
     *lanes++ = begin + static_cast<unsigned>(__builtin_ctz(bits));
@@ -42,8 +42,6 @@ inline __attribute__((always_inline)) unsigned bitsOfGreater(Floats a, Floats b)
 #endif
 }
 
-constexpr auto append = appendEach;
-
 #include "continuous/swept_lanes_kernel.inc"
 }  // namespace plain
 
@@ -63,8 +61,6 @@ inline __attribute__((always_inline)) unsigned bitsOfGreater(Floats a, Floats b)
   return static_cast<unsigned>(_mm256_movemask_ps(_mm256_cmp_ps(a, b, _CMP_GT_OQ)));
 }
 
-constexpr auto append = appendEach;
-
 #include "continuous/swept_lanes_kernel.inc"
 }  // namespace avx2
 #pragma GCC pop_options
@@ -82,6 +78,7 @@ inline __attribute__((always_inline)) unsigned bitsOfGreater(Floats a, Floats b)
   return _mm512_cmp_ps_mask(a, b, _CMP_GT_OQ);
 }
 
+// All at once: of the vectors that are written the first numbers are hits.
 inline __attribute__((always_inline)) void append(unsigned bits, std::uint32_t begin,
                                                   std::uint32_t source, std::uint32_t* lanes,
                                                   std::uint32_t* sources) {
