@@ -1,8 +1,29 @@
 #include "continuous/worker_pool.hpp"
 
+#include <chrono>
 #include <utility>
 
 namespace ball_sim::core {
+namespace {
+
+void pause() {
+#if defined(__x86_64__)
+  __builtin_ia32_pause();
+#else
+  std::this_thread::yield();
+#endif
+}
+
+// To be woken takes as long as many a piece of work: so one looks out for a while before one
+// sleeps.
+template <class Condition>
+void lookOutFor(const Condition& condition) {
+  constexpr std::chrono::microseconds kPatience(50);
+  const auto end = std::chrono::steady_clock::now() + kPatience;
+  while (!condition() && std::chrono::steady_clock::now() < end) pause();
+}
+
+}  // namespace
 
 WorkerPool::WorkerPool(unsigned workers) {
   try {
@@ -40,6 +61,7 @@ void WorkerPool::start(const void* task, Call call) {
   }
   begin_.notify_all();
   attempt(task, call, 0);
+  lookOutFor([this] { return busy_ == 0; });
   std::unique_lock<std::mutex> lock(mutex_);
   end_.wait(lock, [this] { return busy_ == 0; });
   if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
@@ -47,9 +69,11 @@ void WorkerPool::start(const void* task, Call call) {
 
 void WorkerPool::work(unsigned worker) {
   std::uint64_t done = 0;
-  std::unique_lock<std::mutex> lock(mutex_);
+  const auto isCalled = [&] { return quits_ || round_ != done; };
   while (true) {
-    begin_.wait(lock, [&] { return quits_ || round_ != done; });
+    lookOutFor(isCalled);
+    std::unique_lock<std::mutex> lock(mutex_);
+    begin_.wait(lock, isCalled);
     if (quits_) return;
     done = round_;
     const void* task = task_;

@@ -1,6 +1,7 @@
 // Threads that are kept, for work that comes in many short pieces.
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
@@ -45,9 +46,10 @@ class WorkerPool {
   std::condition_variable end_;
   const void* task_ = nullptr;
   Call call_ = nullptr;
-  std::uint64_t round_ = 0;  // counts the tasks; its change wakes the workers
-  unsigned busy_ = 0;        // workers that have not finished this round
-  bool quits_ = false;
+  // Changed under the lock, and looked at without it, too.
+  std::atomic<std::uint64_t> round_{0};  // counts the tasks; its change wakes the workers
+  std::atomic<unsigned> busy_{0};        // workers that have not finished this round
+  std::atomic<bool> quits_{false};
   std::exception_ptr error_;
 };
 
