@@ -24,8 +24,8 @@ struct MethodCosts {
 constexpr double kNearBalls = 5e3;  // fit into the cache
 constexpr double kFarBalls = 1e5;
 constexpr std::array<MethodCosts, 2> kCosts = {
-    {{"event_driven", 0.5e-6, 1.2e-6, 0.3e-6, 1.4e-6, 0.38e-6},
-     {"continuous", 1.4e-6, 2.3e-6, 0.34e-6, 0.46e-6, 0}}};
+    {{"event_driven", 0.43e-6, 0.8e-6, 0.22e-6, 0.36e-6, 0.15e-6},
+     {"continuous", 0.74e-6, 1.05e-6, 0.16e-6, 0.17e-6, 0}}};
 
 // Balls of like size, as one: sums over pairs of classes stand for sums over pairs of balls.
 struct SizeClass {
