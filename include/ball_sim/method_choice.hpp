@@ -85,10 +85,11 @@ std::vector<std::string> methodsThatKeep(SimultaneousImpacts policy);
 SceneNumbers sceneNumbers(const Surroundings& surroundings, const std::vector<Ball>& balls);
 
 /// CPU time of a simulated second, s, by costs measured on gases and fluids of 10^3 to 10^5 spheres
-/// in a closed box (Xeon with 2 MiB of L2 a core): an impact costs so much, and so does the way of a
-/// ball to where its neighbours were; both cost more where the balls do not fit into the cache. An
-/// impact of a large ball among small ones costs event_driven more, by the balls it has around it.
-/// Mostly within 10 % of what was measured for those, and 40 % at worst; a factor of 2 for discs.
+/// in a closed box (Xeon with 2 MiB of L2 a core): an impact costs so much, and so does the way of
+/// a ball to where its neighbours were; both cost more where the balls do not fit into the cache.
+/// An impact of a large ball among small ones costs event_driven more, by the balls it has around
+/// it. Mostly within 10 % of what was measured for those, and 40 % at worst; a factor of 2 for
+/// discs.
 /// @param method  an exact method
 /// @return nothing for a method whose cost is not known
 std::optional<double> estimatedCost(const std::string& method, const SceneNumbers& numbers);
