@@ -137,6 +137,7 @@ TEST_F(NeighbourListsTest, AreThoseOfTheFirstFillToo) {
 TEST_F(NeighbourListsTest, AreFollowedBySlots) {
   std::size_t balls = kBalls;
   for (; balls > 10; balls -= 10) {
+    for (int change = 0; change < 100; ++change) come(static_cast<Slot>(random_.index(balls)));
     for (Slot slot = 0; slot < balls; ++slot) {
       const std::size_t steps = (lists_.count(slot) + kSearchStep - 1) / kSearchStep;
       for (std::size_t i = 0; i < steps * kSearchStep; ++i) {

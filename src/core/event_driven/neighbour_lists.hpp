@@ -230,7 +230,9 @@ class NeighbourLists {
 
   void moveToRow(List& list) {
     const Slot row = takeRow();
-    std::copy(list.slots.begin(), list.slots.end(), &rows_[row * row_length_]);
+    Slot* const begin = &rows_[row * row_length_];
+    // What another list has left may be slots that are gone.
+    std::fill(std::copy(list.slots.begin(), list.slots.end(), begin), begin + row_length_, Slot{0});
     list.slots[0] = row;
   }
 
