@@ -9,11 +9,10 @@
 #include "ball_sim/random_source.hpp"
 #include "ball_sim/text.hpp"
 #include "packing.hpp"
+#include "pi.hpp"
 
 namespace ball_sim::core {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 double cubed(double x) { return x * x * x; }
 

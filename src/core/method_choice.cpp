@@ -7,11 +7,10 @@
 
 #include "ball_sim/text.hpp"
 #include "ball_sim/walls.hpp"
+#include "pi.hpp"
 
 namespace ball_sim::core {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 // What a method takes, s: for an impact, and for the way of a ball by the mean distance of balls;
 // up to kNearBalls, and from kFarBalls on. And what each ball of the crowd adds to an impact.

@@ -12,11 +12,10 @@
 #include "packing_lattice.hpp"
 #include "packing_relaxation.hpp"
 #include "packing_room.hpp"
+#include "pi.hpp"
 
 namespace ball_sim::core {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 // Random sequential addition of equal balls comes to an end at a packing fraction of 0.382 in space
 // and 0.547 in the plane; well before that it is quick. Source: Torquato, Uche, Stillinger,

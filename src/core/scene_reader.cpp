@@ -18,6 +18,7 @@
 #include "ball_sim/methods.hpp"
 #include "ball_sim/overlap_index.hpp"
 #include "ball_sim/text.hpp"
+#include "pi.hpp"
 #include "yaml_field.hpp"
 
 namespace ball_sim::core {
@@ -39,7 +40,6 @@ constexpr double kMaxSigma = kMaxSpeed / 15;
 // A shorter normal is zero for all that matters.
 constexpr double kShortestNormal = 1e-9;
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
 // --- surroundings

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <limits>
 
+#include "pi.hpp"
+
 namespace ball_sim::core {
 namespace {
 
@@ -16,8 +18,6 @@ constexpr double kCostOfPair = 30;     // whose bounding spheres overlap
 // at the start of a frame, and after an impact all, as balls have turned, but less time is left.
 constexpr double kCubesInSpace = 40;
 constexpr double kCubesInPlane = 12;
-
-constexpr double kPi = 3.14159265358979323846;
 
 }  // namespace
 

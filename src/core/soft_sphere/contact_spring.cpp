@@ -4,14 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pi.hpp"
 #include "stepping/hardest_approach.hpp"
 
 namespace ball_sim::core {
-namespace {
-
-constexpr double kPi = 3.14159265358979323846;
-
-}  // namespace
 
 ContactSpring contactSpring(double contact_time, double restitution) {
   const double b = -std::log(std::max(restitution, kLeastRestitution)) / contact_time;
